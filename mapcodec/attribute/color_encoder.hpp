@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "mapcodec/attribute/channel_encoder.hpp"
+
+namespace mapcodec {
+
+/// Encodes a colour channel (is_color) as a "colour" section (attribute_format.md 3) whose mean distance to
+/// `values`, point by point on a scale of 0..255, is at most `bound` > 0, and as near below it as the search
+/// finds.
+/// @param voxels  Morton-sorted, coordinates below 2^21. Threads: pure.
+[[nodiscard]] ChannelEncoding encode_color(const Channel& values, double bound,
+                                           std::span<const VoxelCoord> voxels, Effort effort);
+
+}  // namespace mapcodec
