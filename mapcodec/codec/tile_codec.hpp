@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The shape of every tile codec: a tile becomes bytes by a pure function, and back.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "mapcodec/base/bytes.hpp"
+#include "mapcodec/base/decode_limits.hpp"
+#include "mapcodec/base/result.hpp"
+#include "mapcodec/cloud/map_schema.hpp"
+#include "mapcodec/cloud/point_cloud.hpp"
+#include "mapcodec/cloud/tile_key.hpp"
+
+namespace mapcodec {
+
+/// First byte of every tile payload (FORMAT.md 3). Ids are never reused.
+enum class CodecId : std::uint8_t { lossless = 1, points = 2, paper = 3, surface = 4, occupancy = 5 };
+[[nodiscard]] constexpr const char* codec_name(CodecId id) {
+  constexpr const char* kNames[] = {"?", "lossless", "points", "paper", "surface", "occupancy"};
+  return kNames[static_cast<std::size_t>(id) <= 5 ? static_cast<std::size_t>(id) : 0];
+}
+
+/// Speed against size at the same promise.
+enum class Effort : std::uint8_t { fast, standard, high };
+
+/// Parameters of the 2014 paper's method (PAPER.md, Algorithm 1), in metres where they are lengths.
+struct PaperSettings {
+  double perc_process = 0.05;      ///< stop when this share of the points is left
+  double distance_m = 0.05;        ///< RANSAC inlier threshold
+  std::uint32_t min_points = 200;  ///< smallest plane [points]
+  std::uint32_t outlier_k = 5;     ///< a point with fewer neighbours than this within outlier_radius_m is isolated
+  double outlier_radius_m = 0.2;
+  std::uint32_t clusters = 1;      ///< K of K-means on colour
+  double alpha_m = 0.15;           ///< radius of the alpha shape; smaller: more detail
+  double rel_area = 1;             ///< least points per square metre of a kept triangle
+  double min_density = 0.1;        ///< and at least this share of the density at its cluster's median point (the paper: 0)
+  double reduction_m = 0.02;       ///< contour reduction: largest distance of a left-out vertex to the outline
+  double leftover_step_m = 0.002;  ///< voxel side of the remaining points (entropy-coded form)
+  bool raw = false;                ///< store as the paper did (floats), to compare its own ratio
+};
+
+struct TileSettings {
+  CodecId codec = CodecId::points;
+  Effort effort = Effort::standard;
+  bool keep_counts = true;  ///< points: voxels keep how many points they stood for
+  PaperSettings paper;
+};
+
+/// What a tile lost, measured by its encoder on what its decoder will give.
+struct TileErrors {
+  double rms_m = 0;             ///< symmetric: the larger direction
+  double max_axis_error_m = 0;  ///< largest error along one axis
+  double color_error = 0;       ///< mean RGB distance, 0..255 scale
+  double density_error = 0;     ///< sum |n_dec - n_orig| / N over 10 cm voxels
+};
+
+struct EncodedTile {
+  CodecId codec = CodecId::points;
+  Bytes bytes;                        ///< payload, FORMAT.md 3
+  std::uint64_t points = 0;           ///< points the decoder will give
+  std::uint64_t input_points = 0;     ///< points that went in
+  std::uint64_t geometry_bytes = 0;   ///< of `bytes`, what is not channels
+  Box bounds;                         ///< of the decoded points and the original ones
+  TileErrors errors;
+};
+
+/// Encodes the points of one tile. Pure: same input, same bytes, on any thread.
+/// @param tile      points [m, map frame], channels as in schema.channels (all, dropped ones too, same order).
+/// @param schema    schema.step_m and schema.channels say what is kept.
+/// Errors: InvalidArgument (non-finite points in a lossy codec, a lattice finer than 2^21 cells a side, empty tile).
+[[nodiscard]] Result<EncodedTile> encode_tile(const PointCloud& tile, const MapSchema& schema,
+                                              const TileSettings& settings);
+
+/// Decodes one tile payload, which may be hostile.
+/// @return points laid out as schema.layout().
+/// Errors: Truncated, Malformed, LimitExceeded, UnknownCodec (with byte offset). Threads: pure.
+[[nodiscard]] Result<PointCloud> decode_tile(ByteSpan bytes, const MapSchema& schema, const DecodeLimits& limits = {});
+
+/// What the first bytes of a payload say, without decoding it.
+struct TileHeader {
+  CodecId codec = CodecId::points;
+  std::uint64_t points = 0;
+};
+[[nodiscard]] Result<TileHeader> read_tile_header(ByteSpan bytes);
+
+}  // namespace mapcodec
