@@ -1,0 +1,270 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "slam_adapter/compress.hpp"
+
+#include <unistd.h>
+
+#include <chrono>
+#include <filesystem>
+#include <set>
+
+#include "maps/map_writer.hpp"
+#include "parallel/encode_pipeline.hpp"
+#include "parallel/survey.hpp"
+#include "parallel/tile_plan.hpp"
+#include "parallel/tile_set.hpp"
+#include "slam_adapter/formats/formats.hpp"
+#include "slam_adapter/lattice.hpp"
+#include "slam_adapter/order_source.hpp"
+#include "slam_adapter/rate_search.hpp"
+#include "slam_adapter/schema_choice.hpp"
+
+namespace mapcodec {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double lap(Clock::time_point& from) {
+  const auto now = Clock::now();
+  const double seconds = std::chrono::duration<double>(now - from).count();
+  from = now;
+  return seconds;
+}
+
+std::uint64_t memory_budget(const CompressOptions& options) {
+  if (options.max_memory_bytes != 0) return options.max_memory_bytes;
+  const long pages = sysconf(_SC_PHYS_PAGES), page = sysconf(_SC_PAGESIZE);
+  return pages > 0 && page > 0 ? std::uint64_t(pages) * std::uint64_t(page) / 2 : std::uint64_t{2} << 30;
+}
+
+Error with_file(const std::string& path, const Error& e) {
+  if (e.message.find(path) != std::string::npos) return e;
+  return make_error(e.code, path + ": " + e.message, e.offset);
+}
+
+TileSettings tile_settings(const CompressOptions& options) {
+  TileSettings s;
+  s.effort = options.effort;
+  s.keep_counts = options.keep_counts;
+  s.paper = options.paper;
+  s.codec = options.promise == PromiseKind::lossless ? CodecId::lossless
+            : options.promise == PromiseKind::paper  ? CodecId::paper
+                                                     : CodecId::points;
+  return s;
+}
+
+/// Whole-map errors from those of the tiles: sums weighted by points, so that no tile has to be looked at again.
+class ErrorSum {
+ public:
+  void add(const EncodedTile& t) {
+    const auto n = static_cast<double>(t.input_points);
+    points_ += n;
+    squares_ += n * t.errors.rms_m * t.errors.rms_m;
+    color_ += n * t.errors.color_error;
+    density_ += n * t.errors.density_error;
+    max_axis_ = std::max(max_axis_, t.errors.max_axis_error_m);
+  }
+  [[nodiscard]] TileErrors total() const {
+    if (points_ == 0) return {};
+    return {std::sqrt(squares_ / points_), max_axis_, color_ / points_, density_ / points_};
+  }
+
+ private:
+  double points_ = 0, squares_ = 0, color_ = 0, density_ = 0, max_axis_ = 0;
+};
+
+/// One compression from the tiles on: may be repeated with a finer lattice if the first one misses an RMS promise.
+class Job {
+ public:
+  Job(PointSource& source, const std::string& path, const CompressOptions& options)
+      : source_(source), path_(path), options_(options), arena_(options.threads) {}
+
+  Result<CompressReport> run() {
+    auto begin = Clock::now(), at = begin;
+    MAPCODEC_TRY(look_at_source());
+    report_.survey_seconds = lap(at);
+    MAPCODEC_TRY(make_tiles());
+    report_.tiling_seconds = lap(at);
+    MAPCODEC_TRY(encode_until_kept());
+    report_.seconds = lap(begin);
+    report_.threads = arena_.threads();
+    report_.points = survey_.points;
+    report_.dropped_points = survey_.dropped;
+    return std::move(report_);
+  }
+
+ private:
+  Status look_at_source() {
+    SurveySettings s;
+    s.memory_budget_bytes = memory_budget(options_);
+    s.arena = &arena_;
+    s.progress = options_.progress;
+    s.stop = options_.stop;
+    MAPCODEC_ASSIGN(survey_, survey(source_, s));
+    if (survey_.dropped > 0) {
+      report_.warnings.push_back(std::to_string(survey_.dropped) + " points without a finite position were dropped");
+    }
+    report_.warnings.insert(report_.warnings.end(), survey_.warnings.begin(), survey_.warnings.end());
+    return {};
+  }
+
+  Status make_tiles() {
+    TilePlanSettings plan;
+    if (options_.tile_size_m > 0) plan.tile_size_m = options_.tile_size_m;
+    if (options_.promise == PromiseKind::paper) plan.target_points = kPaperTilePoints;
+    const double step = smallest_step();
+    if (step > 0) plan.max_side_m = step * double(1 << 20);
+    MAPCODEC_ASSIGN(plan_, plan_tiles(survey_, plan));
+    MAPCODEC_ASSIGN(schema_, choose_schema(survey_, options_, plan_.origin(), plan_.tile_size_m(), report_.warnings));
+    TileSetSettings s;
+    s.memory_budget_bytes = memory_budget(options_);
+    s.temp_dir = options_.temp_folder.empty() ? folder_of(path_) : options_.temp_folder;
+    s.arena = &arena_;
+    s.progress = options_.progress;
+    s.stop = options_.stop;
+    auto tiles = survey_.cloud ? build_tiles(std::move(*survey_.cloud), plan_, s) : build_tiles(source_, plan_, s);
+    survey_.cloud.reset();
+    if (!tiles.ok()) return tiles.error();
+    tiles_ = std::make_unique<TileSet>(std::move(tiles).value());
+    return {};
+  }
+
+  /// A voxel side that the promise will not go below, 0 where there is none.
+  [[nodiscard]] double smallest_step() const {
+    if (options_.promise == PromiseKind::max_error || options_.promise == PromiseKind::rms) return options_.promise_m;
+    return 0;
+  }
+
+  static std::string folder_of(const std::string& path) {
+    const auto parent = std::filesystem::path(path).parent_path();
+    return parent.empty() ? "." : parent.string();
+  }
+
+  Status encode_until_kept() {
+    MAPCODEC_TRY(find_target());
+    constexpr int kTries = 4;
+    for (int i = 0; i < kTries; ++i) {
+      auto at = Clock::now();
+      MAPCODEC_TRY(encode_once());
+      report_.tiles_seconds = lap(at);
+      const double rms = errors_.total().rms_m;
+      if (schema_.promise != PromiseKind::rms || rms <= schema_.promise_value) break;
+      if (i + 1 == kTries) return make_error(ErrorCode::kPromiseBroken, "no voxel size was found that keeps the RMS");
+      schema_.step_m *= 0.999 * schema_.promise_value / rms;
+    }
+    auto at = Clock::now();
+    MAPCODEC_TRY(commit());
+    report_.commit_seconds = lap(at);
+    return {};
+  }
+
+  /// --target-ratio and --target-bpp: the voxel size that gives the size, found on a sample of the tiles.
+  Status find_target() {
+    if (!options_.target_bits_per_point && !options_.target_ratio) return {};
+    const double bits = options_.target_bits_per_point
+                            ? *options_.target_bits_per_point
+                            : *options_.target_ratio * 8 * double(raw_bytes_per_point(schema_));
+    MAPCODEC_ASSIGN(schema_.step_m, find_step_for_bits(bits, *tiles_, schema_, tile_settings(options_), arena_, options_.stop));
+    // The promise is what this step gives, with room for what the sample did not show.
+    schema_.promise_value = schema_.step_m * 0.52;
+    return {};
+  }
+
+  Status encode_once() {
+    errors_ = {};
+    bounds_ = {};
+    report_.geometry_bytes = 0;
+    report_.tile_seconds.clear();
+    MapInfo info;
+    info.schema = write_schema(schema_);
+    info.origin = plan_.origin();
+    info.tile_size_m = schema_.tile_size_m;
+    writer_.reset();
+    MAPCODEC_ASSIGN(MapWriter writer, MapWriter::create(path_, info, options_.overwrite));
+    writer_ = std::make_unique<MapWriter>(std::move(writer));
+    PipelineSettings pipeline;
+    pipeline.arena = &arena_;
+    pipeline.memory_budget_bytes = memory_budget(options_);
+    pipeline.progress = options_.progress;
+    pipeline.stop = options_.stop;
+    pipeline.tile_seconds = &report_.tile_seconds;
+    return encode_tiles(*tiles_, schema_, tile_settings(options_), pipeline,
+                        [this](const TileKey& key, EncodedTile&& t) { return store(key, std::move(t)); });
+  }
+
+  Status store(const TileKey& key, EncodedTile&& t) {
+    errors_.add(t);
+    bounds_.add(t.bounds);
+    report_.geometry_bytes += t.geometry_bytes;
+    return writer_->add(key, static_cast<std::uint8_t>(t.codec), t.points, t.bounds, t.errors, t.bytes);
+  }
+
+  Status commit() {
+    MapInfo info;
+    info.schema = write_schema(schema_);
+    info.origin = plan_.origin();
+    info.tile_size_m = schema_.tile_size_m;
+    info.input_points = survey_.points;
+    info.input_bytes = options_.input_bytes;
+    info.dropped_points = survey_.dropped;
+    info.achieved = errors_.total();
+    info.bounds = bounds_;
+    MAPCODEC_TRY(writer_->set_info(std::move(info)));
+    // No clock in the archive of a new map: the same input gives the same bytes.
+    const auto revision = writer_->commit(0);
+    return revision.ok() ? Status{} : Status(revision.error());
+  }
+
+  static constexpr std::uint64_t kPaperTilePoints = 1000000;
+
+  PointSource& source_;
+  const std::string path_;
+  const CompressOptions& options_;
+  Arena arena_;
+  Survey survey_;
+  TilePlan plan_;
+  MapSchema schema_;
+  std::unique_ptr<TileSet> tiles_;
+  std::unique_ptr<MapWriter> writer_;
+  ErrorSum errors_;
+  Box bounds_;
+  CompressReport report_;
+};
+
+Result<std::unique_ptr<PointSource>> open_inputs(const std::vector<std::string>& inputs, const ReadOptions& options) {
+  std::vector<std::unique_ptr<PointSource>> sources;
+  for (const std::string& path : inputs) {
+    MAPCODEC_ASSIGN(std::unique_ptr<PointSource> source, open_source(path, options));
+    sources.push_back(std::move(source));
+  }
+  if (sources.size() == 1) return std::move(sources.front());
+  return concatenate(std::move(sources));
+}
+
+}  // namespace
+
+Result<CompressReport> compress(PointSource& source, const std::string& path, const CompressOptions& options) {
+  if (!options.keep_order) return Job(source, path, options).run();
+  OrderSource ordered(source);
+  return Job(ordered, path, options).run();
+}
+
+Result<CompressReport> compress_files(const std::vector<std::string>& inputs, const std::string& path,
+                                      CompressOptions options) {
+  std::error_code ignored;
+  if (!options.overwrite && std::filesystem::exists(path, ignored)) {
+    return make_error(ErrorCode::kCannotWrite, path + ": exists already (--force replaces it)");
+  }
+  ReadOptions read;
+  read.keep_nonfinite = options.promise == PromiseKind::lossless;
+  read.unit_m = options.unit_m;
+  MAPCODEC_ASSIGN(const std::unique_ptr<PointSource> source, open_inputs(inputs, read));
+  for (const std::string& input : inputs) {
+    MAPCODEC_ASSIGN(const std::uint64_t bytes, input_bytes(input));
+    options.input_bytes += bytes;
+  }
+  auto report = compress(*source, path, options);
+  if (!report.ok() && report.error().code == ErrorCode::kCannotWrite) return with_file(path, report.error());
+  return report;
+}
+
+}  // namespace mapcodec

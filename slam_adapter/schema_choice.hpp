@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// From what was asked and what the source holds to the schema of the map.
+#pragma once
+
+#include "mapcodec/cloud/map_schema.hpp"
+#include "parallel/survey.hpp"
+#include "slam_adapter/compress.hpp"
+
+namespace mapcodec {
+
+/// Decides lattice and channels. What will not be kept as asked is added to `warnings`.
+/// Errors: InvalidArgument (unknown channel name, a bound the coordinates cannot hold); Empty (no finite point).
+[[nodiscard]] Result<MapSchema> choose_schema(const Survey& survey, const CompressOptions& options, const Vec3& origin,
+                                              double tile_size_m, std::vector<std::string>& warnings);
+
+}  // namespace mapcodec
