@@ -1,0 +1,122 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What each promise says, measured here and not by the program."""
+import unittest
+from collections import Counter
+
+from clouds import (FULL, RGB, XYZ, Cloud, Nearest, columns, pack, pcd_bytes, ply_bytes, positions, read_pcd, room,
+                    symmetric_rms, write)
+from program import DIFFERENCE, ProgramTest
+
+
+class Promises(ProgramTest):
+    def round_trip(self, cloud, *flags):
+        source = write(self.path("in.pcd"), pcd_bytes(cloud))
+        archive = self.compress(source, *flags, "--force")
+        self.succeeds("verify", archive)
+        self.succeeds("verify", archive, "--against", source)
+        return read_pcd(self.decompress(archive))
+
+    def assert_axis_error(self, cloud, decoded, bound):
+        a, b = positions(cloud), positions(decoded)
+        self.assertEqual(len(a), len(b))
+        slack = 1e-6  # float32 in the output file
+        for p, q in ((a, b), (b, a)):
+            index = Nearest(q, 4 * bound)
+            self.assertLessEqual(max(index.axis_error(v) for v in p), bound + slack)
+
+    def test_max_error(self):
+        cloud = room(5000)
+        for bound in (0.0005, 0.005, 0.05):
+            self.assert_axis_error(cloud, self.round_trip(cloud, "--max-error", bound), bound)
+
+    def test_rms(self):
+        cloud = room(5000)
+        for bound in (0.003, 0.02):
+            decoded = self.round_trip(cloud, "--rms", bound)
+            self.assertLessEqual(symmetric_rms(positions(cloud), positions(decoded), 0.3), bound * 1.0001)
+
+    def test_rms_is_the_default(self):
+        source = write(self.path("in.pcd"), pcd_bytes(room(3000)))
+        info = self.succeeds("info", self.compress(source), "--json").json
+        self.assertEqual(info["promise"], {"kind": "rms", "value": 0.01})
+
+    def test_lossless_keeps_every_bit(self):
+        cloud = room(5000)
+        for flags in ((), ("--tile-size", 1.5)):
+            decoded = self.round_trip(cloud, "--lossless", *flags)
+            names = [n for n, _ in cloud.fields]
+            self.assertEqual(Counter(cloud.rows), Counter(columns(decoded, names)))
+
+    def test_lossless_keeps_the_order_when_asked(self):
+        cloud = room(4000)
+        decoded = self.round_trip(cloud, "--lossless", "--keep-order", "--tile-size", 2)
+        self.assertEqual(cloud.rows, columns(decoded, [n for n, _ in cloud.fields]))
+
+    def test_lossless_keeps_nan_points(self):
+        nan = float("nan")
+        cloud = room(1000, XYZ)
+        cloud = Cloud(XYZ, cloud.rows + [(nan, nan, nan), (1.0, nan, 2.0), (float("inf"), 0.0, 0.0)])
+        source = write(self.path("in.pcd"), pcd_bytes(cloud))
+        decoded = read_pcd(self.decompress(self.compress(source, "--lossless")))
+        packed = lambda c: Counter(pack(Cloud(XYZ, [r])) for r in positions(c))
+        self.assertEqual(packed(cloud), packed(decoded))
+
+    def test_lossless_doubles(self):
+        fields = (("x", "d"), ("y", "d"), ("z", "d"))
+        cloud = room(2000, fields, offset=(500000.125, 4649776.0625, 100))
+        source = write(self.path("utm.ply"), ply_bytes(cloud))
+        archive = self.compress(source, "--lossless")
+        decoded = read_pcd(self.decompress(archive))
+        self.assertEqual(Counter(cloud.rows), Counter(positions(decoded)))
+
+    def test_color_error(self):
+        cloud = room(5000, RGB)
+        for bound in (3, 10):
+            info_of = self.round_trip(cloud, "--max-error", 0.002, "--color-error", bound)
+            self.assertLessEqual(self.mean_color_error(cloud, info_of), bound * 1.1)
+        exact = self.round_trip(cloud, "--max-error", 0.002, "--color-error", 0)
+        self.assertEqual(Counter(columns(cloud, ["rgb"])), Counter(columns(exact, ["rgb"])))
+
+    def mean_color_error(self, cloud, decoded):
+        """Of decoded points to the nearest original; the program takes the mean of both directions."""
+        color = dict(zip(positions(cloud), columns(cloud, ["rgb"])))
+        index = Nearest(positions(cloud), 0.05)
+        total = 0
+        for p, (rgb,) in zip(positions(decoded), columns(decoded, ["rgb"])):
+            q = min(index.candidates(p), key=lambda v: sum((a - b) ** 2 for a, b in zip(p, v)))
+            total += sum(((rgb >> s & 255) - (color[q][0] >> s & 255)) ** 2 for s in (0, 8, 16)) ** 0.5
+        return total / len(decoded.rows)
+
+    def test_scalars_are_exact_unless_said_otherwise(self):
+        cloud = room(3000, FULL)
+        decoded = self.round_trip(cloud, "--max-error", 0.002)
+        self.assertEqual(Counter(columns(cloud, ["ring"])), Counter(columns(decoded, ["ring"])))
+
+    def test_paper(self):
+        source = write(self.path("in.pcd"), pcd_bytes(room(20000, RGB, noise=0.002)))
+        archive = self.compress(source, "--paper", "--tile-size", 20)
+        self.succeeds("verify", archive)
+        info = self.succeeds("info", archive, "--json").json
+        self.assertEqual(info["promise"]["kind"], "paper")
+        self.assertIn("paper", info["codecs"])
+        measured = self.succeeds("evaluate", source, archive, "--json").json
+        self.assertLess(measured["rms_m"], 0.1)
+
+    def test_target_size_is_met(self):
+        source = write(self.path("in.pcd"), pcd_bytes(room(20000, XYZ)))
+        archive = self.compress(source, "--target-bpp", 6, "--tile-size", 20)
+        bits = 8 * archive.stat().st_size / 20000
+        self.assertLessEqual(bits, 6.3)
+        self.assertGreater(bits, 4.5)
+        archive = self.compress(source, "--target-ratio", 0.06, "--tile-size", 20, "--force")
+        self.assertLessEqual(archive.stat().st_size / (12 * 20000), 0.063)
+
+    def test_verify_tells_another_original(self):
+        source = write(self.path("in.pcd"), pcd_bytes(room(3000)))
+        other = write(self.path("other.pcd"), pcd_bytes(room(3000, seed=2)))
+        archive = self.compress(source, "--max-error", 0.001)
+        self.fails(DIFFERENCE, "verify", archive, "--against", other)
+
+
+if __name__ == "__main__":
+    unittest.main()
