@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The measurements of `mapcodec bench`: each writes JSON, a markdown table and plots into the report folder.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "mapcodec/base/result.hpp"
+
+namespace mapcodec {
+
+struct BenchSettings {
+  std::string data;                ///< folder that is searched for clouds, with its subfolders
+  std::string report;              ///< folder for the results; made if need be
+  int threads = 0;                 ///< for evaluating and scaling; 0: all. Codecs are timed on one core
+  std::vector<std::string> files;  ///< if not empty: only clouds whose path contains one of these
+  bool quick = false;              ///< few clouds and bounds: minutes instead of an hour
+  std::function<void(const std::string&)> say = [](const std::string&) {};  ///< told what is being measured
+};
+
+/// Size against error and speed, ours beside the peers (rate.json, rate.md, rate_*.png).
+/// Errors of all three: NotFound (no data folder), Empty (no cloud fits), CannotWrite, those of the codec.
+/// Threads: one bench at a time.
+[[nodiscard]] Status bench_rate(const BenchSettings& settings);
+/// Speed on one to all cores, and what the measured tiles would take on more (scaling.json, scaling.md,
+/// scaling.png).
+[[nodiscard]] Status bench_scaling(const BenchSettings& settings);
+/// The experiments of Morell et al. 2014 on our data (paper.json, paper.md, paper_*.png).
+[[nodiscard]] Status bench_paper(const BenchSettings& settings);
+
+}  // namespace mapcodec

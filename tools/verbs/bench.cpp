@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "tools/bench/bench.hpp"
+
+#include <spdlog/fmt/fmt.h>
+
+#include <memory>
+
+#include "tools/verbs/report.hpp"
+#include "tools/verbs/verbs.hpp"
+
+namespace mapcodec::cli {
+namespace {
+
+struct Arguments {
+  std::string what;
+  BenchSettings settings;
+};
+
+int run(Arguments& a) {
+  a.settings.say = [](const std::string& text) { fmt::print(stderr, "{}\n", text); };
+  const Status s = a.what == "paper"     ? bench_paper(a.settings)
+                   : a.what == "scaling" ? bench_scaling(a.settings)
+                                         : bench_rate(a.settings);
+  if (!s.ok()) return fail(a.settings.data, s.error());
+  fmt::print("{}/{}.md\n", a.settings.report, a.what);
+  return kDone;
+}
+
+}  // namespace
+
+void add_bench(CLI::App& app, Action& action) {
+  auto a = std::make_shared<Arguments>();
+  CLI::App* verb = app.add_subcommand("bench", "Measurements on a folder of clouds: JSON, tables and plots");
+  verb->add_option("WHAT", a->what, "paper, rate or scaling")->required()->check(CLI::IsMember({"paper", "rate", "scaling"}));
+  verb->add_option("--data", a->settings.data, "Folder that is searched for clouds")->required();
+  verb->add_option("-o,--output", a->settings.report, "Folder for the report")->required();
+  verb->add_option("--threads", a->settings.threads, "0: all cores")->check(CLI::Range(0, 1024));
+  verb->add_option("--only", a->settings.files, "Only clouds whose path contains one of these");
+  verb->add_flag("--quick", a->settings.quick, "Few clouds and bounds");
+  verb->callback([a, &action] { action = [a] { return run(*a); }; });
+}
+
+}  // namespace mapcodec::cli

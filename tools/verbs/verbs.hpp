@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// One function per verb adds its subcommand; parsing picks the one to run.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <functional>
+
+namespace mapcodec::cli {
+
+/// Set by the chosen verb while the command line is parsed; main runs it. @return exit code.
+using Action = std::function<int()>;
+
+void add_compress(CLI::App& app, Action& action);
+void add_decompress(CLI::App& app, Action& action);
+void add_info(CLI::App& app, Action& action);
+void add_verify(CLI::App& app, Action& action);
+void add_evaluate(CLI::App& app, Action& action);
+void add_render(CLI::App& app, Action& action);
+void add_bench(CLI::App& app, Action& action);
+
+}  // namespace mapcodec::cli
