@@ -110,7 +110,7 @@ class Job {
   Status make_tiles() {
     TilePlanSettings plan;
     if (options_.tile_size_m > 0) plan.tile_size_m = options_.tile_size_m;
-    if (options_.promise == PromiseKind::paper) plan.target_points = kPaperTilePoints;
+    plan.target_points = options_.promise == PromiseKind::paper ? kPaperTilePoints : kTilePoints;
     const double step = smallest_step();
     if (step > 0) plan.max_side_m = step * double(1 << 20);
     MAPCODEC_ASSIGN(plan_, plan_tiles(survey_, plan));
@@ -214,7 +214,10 @@ class Job {
     return revision.ok() ? Status{} : Status(revision.error());
   }
 
-  static constexpr std::uint64_t kPaperTilePoints = 1000000;
+  // A cube is split at 1.5 times this, so tiles hold about half of it: 100,000 points. Smaller ones cost bits at their borders.
+  static constexpr double kTilePoints = 200000;
+  // The paper's planes are those of a whole scan: as few cuts as memory and time allow.
+  static constexpr double kPaperTilePoints = 1000000;
 
   PointSource& source_;
   const std::string path_;

@@ -37,11 +37,13 @@ def fetch(folder):
 class Demo:
     def __init__(self, program, folder):
         self.program, self.folder = program, folder
+        self.notes = {}  # what the program said aloud, each once
 
     def run(self, *arguments):
-        done = subprocess.run([self.program, *map(str, arguments)], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, text=True)
+        done = subprocess.run([self.program, *map(str, arguments)], stdin=subprocess.DEVNULL, capture_output=True, text=True)
         if done.returncode != 0:
-            sys.exit(f"demo: {' '.join(map(str, arguments))} ended with {done.returncode}")
+            sys.exit(f"demo: {' '.join(map(str, arguments))} ended with {done.returncode}\n{done.stderr}")
+        self.notes.update(dict.fromkeys(done.stderr.splitlines()))
         return done.stdout
 
     def json(self, *arguments):
@@ -58,7 +60,7 @@ class Demo:
     def row(self, label, made, got, measured):
         colour = measured["color_error"]
         print(f"{label:<20}{made['bytes']:>11,}{made['ratio']:>8.4f}{made['bits_per_point']:>8.3f}"
-              f"{1e3 * measured['rms_m']:>8.3f}{1e3 * measured['max_axis_error_m']:>8.3f}"
+              f"{1e3 * measured['rms_m']:>8.3f}{1e3 * made['achieved']['max_axis_error_m']:>8.3f}"
               f"{'-' if colour is None or not self.coloured(made) else format(colour, '.2f'):>7}"
               f"{made['encode_seconds']:>5.1f}{got['decode_seconds']:>5.2f}", flush=True)
 
@@ -85,7 +87,9 @@ class Demo:
                 shown = decoded
             if number == 1:
                 boxed = archive, made
-        print("\nverify   every promise measured against the original: kept")
+        print("".join(f"\n{note}" for note in self.notes))
+        self.notes.clear()
+        print("verify   every promise measured against the original: kept")
         self.box(*boxed)
         picture = self.folder / f"{stem}.png"
         self.run("render", source, shown, "-o", picture)

@@ -82,7 +82,7 @@ double outside_density(const PlanarTriangles& mesh, const std::vector<Tally>& ta
   double below = 0;
   for (const auto& [density, count] : by_density) {
     below += count;
-    if (2 * below >= points) return std::max(settings.rel_area, settings.min_density * density);
+    if (2 * below >= points) return std::max(settings.rel_area, settings.outside_density * density);
   }
   return settings.rel_area;
 }

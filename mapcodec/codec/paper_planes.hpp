@@ -14,10 +14,11 @@ struct Extraction {
 };
 
 /// Planes by RANSAC, radius outlier removal, K-means on colour, alpha shape, contour reduction, constrained
-/// Delaunay triangulation and the test m / A > rel_area, as in [Morell et al. 2014], with three choices where
-/// the paper is silent: points of a cluster that no kept triangle covers stay as points; contours are rounded
-/// to the lattice before they are triangulated, so that the counts are those of the stored triangles; a
-/// triangle's colour is the mean of its points.
+/// Delaunay triangulation and the test m / A > rel_area, as in [Morell et al. 2014], with one addition
+/// (PaperSettings::outside_density: triangles beyond the outline need a density worth the name) and three
+/// choices where the paper is silent: points of a cluster that no kept triangle covers stay as points;
+/// contours are rounded to the lattice before they are triangulated, so that the counts are those of the
+/// stored triangles; a triangle's colour is the mean of its points.
 /// @param xyz     [m] relative to the tile's corner, finite.
 /// @param colors  one per point, or empty.
 /// @param step_m  vertex step of the lattice.

@@ -34,7 +34,8 @@ struct PaperSettings {
   std::uint32_t clusters = 1;      ///< K of K-means on colour
   double alpha_m = 0.15;           ///< radius of the alpha shape; smaller: more detail
   double rel_area = 1;             ///< least points per square metre of a kept triangle
-  double min_density = 0.1;        ///< and at least this share of the density at its cluster's median point (the paper: 0)
+  double outside_density = 0.2;    ///< a triangle outside the outline needs this share of the density at its cluster's
+                                   ///< median point, too (the paper: 0)
   double reduction_m = 0.02;       ///< contour reduction: largest distance of a left-out vertex to the outline
   double leftover_step_m = 0.002;  ///< voxel side of the remaining points (entropy-coded form)
   bool raw = false;                ///< store as the paper did (floats), to compare its own ratio

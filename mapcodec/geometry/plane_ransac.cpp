@@ -11,8 +11,8 @@
 namespace mapcodec {
 namespace {
 
-constexpr std::size_t kScoredPoints = 20000;
-constexpr int kMaxIterations = 2000;
+constexpr std::size_t kScoredPoints = 2000;
+constexpr int kMaxIterations = 1000;
 
 Plane make_plane(const Eigen::Vector3d& direction, const Eigen::Vector3d& through) {
   Eigen::Vector3d n = direction.normalized();

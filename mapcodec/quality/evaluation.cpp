@@ -43,7 +43,6 @@ void fill_distances(const DistanceStats& ab, const DistanceStats& ba, Evaluation
   e.rms_m = std::max(e.rms_ab_m, e.rms_ba_m);
   e.rms_pool_m = std::sqrt((ab.mean_squared * na + ba.mean_squared * nb) / (na + nb));
   e.max_m = std::max(ab.max_m, ba.max_m);
-  e.max_axis_error_m = std::max(ab.max_axis_m, ba.max_axis_m);
   e.d1_psnr_db = psnr(3 * e.peak_m * e.peak_m, std::max(ab.mean_squared, ba.mean_squared));
 }
 
@@ -99,7 +98,9 @@ Result<Evaluation> evaluate(const PointCloud& original, const PointCloud& decode
   e.points_original = a->size();
   e.points_decoded = b->size();
   e.peak_m = settings.peak_m > 0 ? settings.peak_m : longest_side(a->bounds());
-  fill_distances(summarise(a->xyz, b->xyz, to_decoded), summarise(b->xyz, a->xyz, to_original), e);
+  fill_distances(summarise(a->xyz, to_decoded), summarise(b->xyz, to_original), e);
+  e.max_axis_error_m = std::max(max_axis_error(a->xyz, b->xyz, *indices.decoded, to_decoded),
+                                max_axis_error(b->xyz, a->xyz, *indices.original, to_original));
   fill_colors(pair, e);
   if (settings.with_normals) {
     e.d2_psnr_db = psnr(3 * e.peak_m * e.peak_m, plane_mean_squared_error(pair, settings.knn, runner));

@@ -31,7 +31,7 @@ struct Evaluation {
   double rms_ab_m = kNone, rms_ba_m = kNone;  ///< root mean square distances
   double rms_pool_m = kNone;                  ///< over the points of both directions together
   double max_m = kNone;                       ///< Hausdorff distance
-  double max_axis_error_m = kNone;  ///< largest difference of neighbours along one axis, both directions
+  double max_axis_error_m = kNone;  ///< Hausdorff distance in the maximum norm: largest error along one axis
   double peak_m = kNone;            ///< as used below
   double d1_psnr_db = kNone;        ///< 10 log10(3 peak^2 / larger mean squared distance)
   double d2_psnr_db = kNone;        ///< the same for distances along the normals

@@ -25,6 +25,8 @@ class NeighborIndex {
   [[nodiscard]] std::uint32_t nearest(const Vec3& query, double& squared) const;
   /// The `ids.size()` nearest, nearest first; returns how many there are.
   std::size_t nearest(const Vec3& query, std::span<std::uint32_t> ids, std::span<double> squared) const;
+  /// Indices of all points within `radius_m` (Euclidean), in no order.
+  [[nodiscard]] std::vector<std::uint32_t> within(const Vec3& query, double radius_m) const;
 
  private:
   struct Impl;
@@ -40,9 +42,14 @@ struct Nearest {
 
 /// Sums and extremes of one direction.
 struct DistanceStats {
-  double mean_squared = 0, max_m = 0, max_axis_m = 0;
+  double mean_squared = 0, max_m = 0;
 };
-[[nodiscard]] DistanceStats summarise(std::span<const Vec3> from, std::span<const Vec3> to,
-                                      const Nearest& nearest);
+[[nodiscard]] DistanceStats summarise(std::span<const Vec3> from, const Nearest& nearest);
+
+/// The largest distance in the maximum norm [m] of a point of `from` to its nearest in that norm: what a bound on the error
+/// along each axis promises. The Euclidean neighbours in `nearest` only narrow the search, since of two neighbours the
+/// nearer one can be farther along one axis.
+[[nodiscard]] double max_axis_error(std::span<const Vec3> from, std::span<const Vec3> to, const NeighborIndex& index,
+                                    const Nearest& nearest);
 
 }  // namespace mapcodec

@@ -60,7 +60,6 @@ inline MapSchema schema_of(const PointCloud& cloud) {
 inline PaperSettings small_settings(bool raw = false) {
   PaperSettings s;
   s.min_points = 50;
-  s.rel_area = 500;  // a few stray points do not fill the hole
   s.raw = raw;
   return s;
 }
