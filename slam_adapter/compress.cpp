@@ -140,16 +140,16 @@ class Job {
   }
 
   Status encode_until_kept() {
-    MAPCODEC_TRY(find_target());
-    constexpr int kTries = 4;
-    for (int i = 0; i < kTries; ++i) {
+    MAPCODEC_TRY(find_target(1));
+    MAPCODEC_TRY(refine_for_color());
+    constexpr int kTries = 5;
+    for (int i = 0;; ++i) {
       auto at = Clock::now();
       MAPCODEC_TRY(encode_once());
       report_.tiles_seconds = lap(at);
-      const double rms = errors_.total().rms_m;
-      if (schema_.promise != PromiseKind::rms || rms <= schema_.promise_value) break;
-      if (i + 1 == kTries) return make_error(ErrorCode::kPromiseBroken, "no voxel size was found that keeps the RMS");
-      schema_.step_m *= 0.999 * schema_.promise_value / rms;
+      MAPCODEC_ASSIGN(const bool kept, is_kept_or_adjust());
+      if (kept) break;
+      if (i + 1 == kTries) return make_error(ErrorCode::kPromiseBroken, "no voxel size was found that keeps the promise");
     }
     auto at = Clock::now();
     MAPCODEC_TRY(commit());
@@ -157,21 +157,80 @@ class Job {
     return {};
   }
 
-  /// --target-ratio and --target-bpp: the voxel size that gives the size, found on a sample of the tiles.
-  Status find_target() {
-    if (!options_.target_bits_per_point && !options_.target_ratio) return {};
-    const double bits = options_.target_bits_per_point
-                            ? *options_.target_bits_per_point
-                            : *options_.target_ratio * 8 * double(raw_bytes_per_point(schema_));
-    MAPCODEC_ASSIGN(schema_.step_m, find_step_for_bits(bits, *tiles_, schema_, tile_settings(options_), arena_, options_.stop));
-    // The promise is what this step gives, with room for what the sample did not show.
-    schema_.promise_value = schema_.step_m * 0.52;
+  /// What was measured on the sample may be off for the whole map: then the lattice is made finer.
+  Result<bool> is_kept_or_adjust() {
+    const TileErrors total = errors_.total();
+    if (has_target()) return meets_target_or_adjust();
+    if (schema_.promise == PromiseKind::rms && total.rms_m > schema_.promise_value) {
+      schema_.step_m *= 0.999 * schema_.promise_value / total.rms_m;
+      return false;
+    }
+    const auto color = bounded_color();
+    if (color && schema_.step_m > 0 && total.color_error > schema_.channels[*color].bound &&
+        schema_.coordinates.kind != CoordinateFormat::Kind::fixed) {
+      schema_.step_m *= 0.7;
+      return false;
+    }
+    return true;
+  }
+
+  [[nodiscard]] std::optional<std::size_t> bounded_color() const {
+    for (std::size_t i = 0; i < schema_.channels.size(); ++i) {
+      if (schema_.channels[i].info.name == "rgb" && schema_.channels[i].kept == ChannelKept::bounded) return i;
+    }
+    return std::nullopt;
+  }
+
+  /// Colours keep their bound too: voxels that hold too different ones are too large, whatever the positions allow.
+  Status refine_for_color() {
+    const auto color = bounded_color();
+    const bool lattice = schema_.promise == PromiseKind::rms || schema_.promise == PromiseKind::max_error;
+    if (!color || !lattice || has_target() || schema_.coordinates.kind == CoordinateFormat::Kind::fixed) return {};
+    MAPCODEC_ASSIGN(const double step, find_step_for_color(*color, *tiles_, schema_, arena_));
+    if (step < schema_.step_m) {
+      report_.warnings.push_back("voxels are " + millimetres(step) + " instead of " + millimetres(schema_.step_m) +
+                                 ", so that colours keep their bound (a larger --color-error makes the map smaller)");
+    }
+    schema_.step_m = step;
     return {};
+  }
+
+  static std::string millimetres(double m) {
+    char text[32];
+    std::snprintf(text, sizeof text, "%.3g mm", m * 1e3);
+    return text;
+  }
+
+  [[nodiscard]] bool has_target() const { return options_.target_bits_per_point || options_.target_ratio; }
+  [[nodiscard]] double target_bits() const {
+    return options_.target_bits_per_point ? *options_.target_bits_per_point
+                                          : *options_.target_ratio * 8 * double(raw_bytes_per_point(schema_));
+  }
+
+  /// --target-ratio and --target-bpp: the voxel size that gives the size, found on a sample of the tiles.
+  /// @param correction  of the target, where the whole map took more or less than the sample said.
+  Status find_target(double correction) {
+    if (!has_target()) return {};
+    MAPCODEC_ASSIGN(schema_.step_m, find_step_for_bits(target_bits() * correction, *tiles_, schema_,
+                                                       tile_settings(options_), arena_, options_.stop));
+    return {};
+  }
+
+  Result<bool> meets_target_or_adjust() {
+    const double bits = 8 * double(payload_bytes_) / double(survey_.points - survey_.nonfinite);
+    const double ratio = target_bits() / bits;
+    // What was achieved is what is promised.
+    schema_.promise_value = errors_.total().rms_m;
+    if ((ratio > 0.98 && ratio < 1.02) || ++target_tries_ > 3) return true;
+    correction_ *= ratio;
+    MAPCODEC_TRY(find_target(correction_));
+    return false;
   }
 
   Status encode_once() {
     errors_ = {};
     bounds_ = {};
+    payload_bytes_ = 0;
     report_.geometry_bytes = 0;
     report_.tile_seconds.clear();
     MapInfo info;
@@ -194,6 +253,7 @@ class Job {
   Status store(const TileKey& key, EncodedTile&& t) {
     errors_.add(t);
     bounds_.add(t.bounds);
+    payload_bytes_ += t.bytes.size();
     report_.geometry_bytes += t.geometry_bytes;
     return writer_->add(key, static_cast<std::uint8_t>(t.codec), t.points, t.bounds, t.errors, t.bytes);
   }
@@ -230,6 +290,9 @@ class Job {
   std::unique_ptr<MapWriter> writer_;
   ErrorSum errors_;
   Box bounds_;
+  std::uint64_t payload_bytes_ = 0;
+  double correction_ = 1;  // of the target size
+  int target_tries_ = 0;
   CompressReport report_;
 };
 

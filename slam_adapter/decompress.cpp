@@ -17,10 +17,26 @@ bool keeps_order(const MapSchema& schema) {
   return false;
 }
 
-/// Sorting needs all points at once; this is the price of --keep-order.
-Status write_in_order(const MapFile& map, const std::string& path, const Region& region, const ReadSettings& settings,
-                      const WriteOptions& write, DecompressReport& report) {
-  MAPCODEC_ASSIGN(PointCloud cloud, map.read(region, settings));
+/// Most points that a region's tiles may hold for it to be read in one go.
+constexpr std::uint64_t kAtOnce = 8000000;
+
+std::uint64_t points_of_tiles(const MapFile& map, const Region& region) {
+  std::uint64_t points = 0;
+  for (const std::size_t i : map.tiles_in(region)) points += map.archive().tiles()[i].points;
+  return points;
+}
+
+/// All points at once: for sorting them (the price of --keep-order), and for small regions, whose tiles are then decoded once
+/// instead of a first time for their count.
+Status write_at_once(const MapFile& map, const std::string& path, const Region& region, const ReadSettings& settings,
+                     const WriteOptions& write, Clock::time_point begin, DecompressReport& report) {
+  PointCloud cloud = map.schema().layout();
+  MAPCODEC_TRY(map.read(region, settings, [&](PointCloud&& tile) {
+    if (cloud.empty() && !tile.empty()) report.first_point_seconds = seconds_since(begin);
+    cloud.append(tile);
+    return Status{};
+  }));
+  if (cloud.empty()) return make_error(ErrorCode::kEmpty, "no point lies in the asked region");
   cloud = restore_order(std::move(cloud));
   MAPCODEC_ASSIGN(const std::unique_ptr<PointSink> sink, open_sink(path, cloud.like(), cloud.size(), write));
   MAPCODEC_TRY(sink->write(cloud));
@@ -29,7 +45,9 @@ Status write_in_order(const MapFile& map, const std::string& path, const Region&
 }
 
 Status write_tiles(const MapFile& map, const std::string& path, const Region& region, const ReadSettings& settings,
-                   const WriteOptions& write, std::uint64_t count, Clock::time_point begin, DecompressReport& report) {
+                   const WriteOptions& write, Clock::time_point begin, DecompressReport& report) {
+  MAPCODEC_ASSIGN(const std::uint64_t count, map.count(region, settings));
+  if (count == 0) return make_error(ErrorCode::kEmpty, "no point lies in the asked region");
   MAPCODEC_ASSIGN(const std::unique_ptr<PointSink> sink, open_sink(path, map.schema().layout(), count, write));
   MAPCODEC_TRY(map.read(region, settings, [&](PointCloud&& cloud) -> Status {
     if (report.points == 0 && !cloud.empty()) report.first_point_seconds = seconds_since(begin);
@@ -47,11 +65,8 @@ Result<DecompressReport> decompress(const std::string& map_path, const std::stri
   const auto begin = Clock::now();
   DecompressReport report;
   MAPCODEC_ASSIGN(const MapFile map, MapFile::open(map_path, revision));
-  MAPCODEC_ASSIGN(const std::uint64_t count, map.count(region, settings));
-  if (count == 0) return make_error(ErrorCode::kEmpty, "no point lies in the asked region");
-  MAPCODEC_TRY(keeps_order(map.schema())
-                   ? write_in_order(map, path, region, settings, write, report)
-                   : write_tiles(map, path, region, settings, write, count, begin, report));
+  const bool at_once = keeps_order(map.schema()) || (!region.everything() && points_of_tiles(map, region) <= kAtOnce);
+  MAPCODEC_TRY((at_once ? write_at_once : write_tiles)(map, path, region, settings, write, begin, report));
   report.tiles_read = map.tiles_in(region).size();
   report.bytes_read = map.archive().bytes_read();
   report.seconds = seconds_since(begin);

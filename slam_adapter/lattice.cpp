@@ -2,7 +2,6 @@
 #include "slam_adapter/lattice.hpp"
 
 #include <cmath>
-#include <string>
 
 #include "mapcodec/geometry/quantizer.hpp"
 
@@ -41,19 +40,16 @@ Lattice on_source_lattice(double units_each_side, const CoordinateFormat& format
 
 }  // namespace
 
-Result<Lattice> lattice_for_max_error(double max_error_m, const CoordinateFormat& format, const Box& bounds,
+Lattice lattice_for_max_error(double max_error_m, const CoordinateFormat& format, const Box& bounds,
                                       const Vec3& origin) {
   if (format.kind == Kind::fixed && has_one_scale(format)) {
     // A hair below the bound, so that an exact multiple does not exceed it by the last bit of a double.
     return on_source_lattice(std::floor(max_error_m * (1 - 1e-9) / format.scale[0]), format, origin);
   }
   const double rounding = rounding_m(format, bounds, max_error_m);
-  if (rounding * 4 > max_error_m) {
-    return make_error(ErrorCode::kInvalidArgument,
-                      "coordinates of " + std::to_string(largest_coordinate(bounds)) +
-                          " m in this format cannot keep an error of " + std::to_string(max_error_m) +
-                          " m: use --lossless or a coarser bound");
-  }
+  // Far from the origin the format is coarser than the bound. Its numbers are then so sparse that each is alone in a voxel of
+  // the bound's size, and rounding the centre gives it back: a centre is never farther from its float than from the point.
+  if (rounding > max_error_m / 2) return Lattice{origin, max_error_m};
   return Lattice{origin, 2 * (max_error_m - rounding)};
 }
 
@@ -69,7 +65,7 @@ double lattice_rms(std::span<const Vec3> points, const Lattice& lattice, Kind ki
   return points.empty() ? 0 : std::sqrt(sum / static_cast<double>(points.size()));
 }
 
-Result<Lattice> lattice_for_rms(double rms_m, const CoordinateFormat& format, std::span<const Vec3> sample,
+Lattice lattice_for_rms(double rms_m, const CoordinateFormat& format, std::span<const Vec3> sample,
                                 const Vec3& origin) {
   // Errors spread evenly over a voxel give rms = step / 2; flat or gridded clouds can allow more or less.
   double low = rms_m / 2, high = rms_m * 4;

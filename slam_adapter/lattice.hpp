@@ -4,7 +4,6 @@
 
 #include <span>
 
-#include "mapcodec/base/result.hpp"
 #include "mapcodec/cloud/point_cloud.hpp"
 
 namespace mapcodec {
@@ -16,12 +15,11 @@ struct Lattice {
 
 /// The largest voxels whose centres, as the format will hold them, lie within `max_error_m` of every point of the voxel
 /// along each axis. `origin` is moved by less than a voxel where the format has a lattice of its own.
-/// Errors: InvalidArgument where the format is too coarse for the bound.
-[[nodiscard]] Result<Lattice> lattice_for_max_error(double max_error_m, const CoordinateFormat& format,
+[[nodiscard]] Lattice lattice_for_max_error(double max_error_m, const CoordinateFormat& format,
                                                     const Box& bounds, const Vec3& origin);
 
 /// The largest voxels with which the root mean square distance of `sample` to the centres stays <= rms_m.
-[[nodiscard]] Result<Lattice> lattice_for_rms(double rms_m, const CoordinateFormat& format, std::span<const Vec3> sample,
+[[nodiscard]] Lattice lattice_for_rms(double rms_m, const CoordinateFormat& format, std::span<const Vec3> sample,
                                               const Vec3& origin);
 
 /// Root mean square distance [m] of the points to their voxels' centres: the symmetric RMS of coding them so.

@@ -109,8 +109,12 @@ std::vector<std::size_t> MapFile::tiles_in(const Region& region) const {
 }
 
 Result<Bytes> MapFile::fetch(std::size_t index) const {
-  // One segment a tile until maps are updated in place.
-  return archive_->read(archive_->tiles()[index].segments.front());
+  const std::vector<SegmentRef>& segments = archive_->tiles()[index].segments;
+  if (segments.size() != 1) {
+    return make_error(ErrorCode::kUnsupported, "a tile of " + std::to_string(segments.size()) +
+                                                   " segments: this version reads maps that were not updated in place");
+  }
+  return archive_->read(segments.front());
 }
 
 Result<PointCloud> MapFile::read_tile(std::size_t index, const DecodeLimits& limits) const {

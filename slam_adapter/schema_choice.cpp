@@ -48,19 +48,15 @@ Status check_names(const PointCloud& layout, const std::vector<std::string>& ask
   return {};
 }
 
-Status choose_lattice(const Survey& survey, const CompressOptions& options, MapSchema& schema) {
-  if (options.promise == PromiseKind::lossless || options.promise == PromiseKind::paper) {
-    schema.promise_value = 0;
-    return {};
-  }
+void choose_lattice(const Survey& survey, const CompressOptions& options, MapSchema& schema) {
+  if (options.promise == PromiseKind::lossless || options.promise == PromiseKind::paper) return;
   schema.promise_value = options.promise_m;
-  MAPCODEC_ASSIGN(const Lattice lattice,
-                  options.promise == PromiseKind::max_error
-                      ? lattice_for_max_error(options.promise_m, schema.coordinates, survey.bounds, schema.origin)
-                      : lattice_for_rms(options.promise_m, schema.coordinates, survey.sample, schema.origin));
+  const Lattice lattice =
+      options.promise == PromiseKind::max_error
+          ? lattice_for_max_error(options.promise_m, schema.coordinates, survey.bounds, schema.origin)
+          : lattice_for_rms(options.promise_m, schema.coordinates, survey.sample, schema.origin);
   schema.origin = lattice.origin;
   schema.step_m = lattice.step_m;
-  return {};
 }
 
 void say_what_is_dropped(const MapSchema& schema, const CompressOptions& options, std::vector<std::string>& warnings) {
@@ -85,7 +81,7 @@ Result<MapSchema> choose_schema(const Survey& survey, const CompressOptions& opt
   schema.origin = origin;
   schema.tile_size_m = tile_size_m;
   schema.coordinates = survey.layout.coordinates;
-  MAPCODEC_TRY(choose_lattice(survey, options, schema));
+  choose_lattice(survey, options, schema);
   for (std::size_t i = 0; i < survey.layout.channels.size(); ++i) {
     schema.channels.push_back(choose_channel(survey.layout.channels[i].info, survey.constant_channels[i], options));
   }

@@ -9,7 +9,7 @@
 namespace mapcodec {
 
 /// Decides lattice and channels. What will not be kept as asked is added to `warnings`.
-/// Errors: InvalidArgument (unknown channel name, a bound the coordinates cannot hold); Empty (no finite point).
+/// Errors: InvalidArgument (unknown channel name); Empty (no finite point).
 [[nodiscard]] Result<MapSchema> choose_schema(const Survey& survey, const CompressOptions& options, const Vec3& origin,
                                               double tile_size_m, std::vector<std::string>& warnings);
 

@@ -87,17 +87,24 @@ double measured_error(const ColorContext& tile, const Channel& values, const Cha
 
 }  // namespace
 
+double least_color_error(const Channel& values, const ColorContext& context) {
+  return measured_error(context, values, merge_voxels(values, context.voxels));
+}
+
 Result<ChannelEncoding> encode_tile_color(const ChannelSchema& channel, const Channel& values,
                                           const ColorContext& context, Effort effort) {
+  // Points at one position cannot be told apart by their neighbours' distance: different colours there would cost bits and
+  // raise the measured error.
   const Channel merged = merge_voxels(values, context.voxels);
-  const double floor = measured_error(context, values, merged);
-  const Channel& source = floor < 0.7 * channel.bound ? merged : values;
+  const double floor = measured_error(context, values, merged) / channel.bound;
   ChannelSchema target = channel;
-  constexpr int kTries = 5;
+  // The loss of merging and that of coding add up about as independent errors do.
+  target.bound *= std::max(0.3, std::sqrt(std::max(0.0, 1 - floor * floor)));
+  constexpr int kTries = 4;
   for (int i = 0;; ++i) {
-    MAPCODEC_ASSIGN(ChannelEncoding e, encode_channel(target, source, context.voxels, effort));
+    MAPCODEC_ASSIGN(ChannelEncoding e, encode_channel(target, merged, context.voxels, effort));
     e.error = measured_error(context, values, e.decoded);
-    if (e.error <= channel.bound || i + 1 == kTries) return e;
+    if (e.error <= channel.bound || floor >= 1 || i + 1 == kTries) return e;
     target.bound *= std::max(0.5, 0.97 * channel.bound / e.error);
   }
 }

@@ -1,0 +1,166 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Adds golden archives: small maps whose decoded points must never change.
+
+Usage: make_golden.py MAPCODEC_PROGRAM [--replace]
+Makes the clouds of CLOUDS by rule, compresses each and writes tests/golden/NAME.mapc and its entry in hashes.json, as
+tests/support/read_tile.py decodes it. Archives that are there already are left alone: what is tested is that later
+versions decode them, not that later versions write the same bytes. Until format 1.0 --replace makes all of them anew
+after a deliberate change of the format; from 1.0 on files are only added, never rewritten. Standard library only.
+"""
+import argparse
+import json
+import pathlib
+import random
+import struct
+import subprocess
+import sys
+import tempfile
+
+HERE = pathlib.Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE.parent / "support"))
+import read_tile  # noqa: E402
+
+NAN, INFINITY = float("nan"), float("inf")
+PCD_TYPE = {"f": ("F", 4), "d": ("F", 8), "I": ("U", 4), "H": ("U", 2), "B": ("U", 1), "b": ("I", 1), "h": ("I", 2),
+            "i": ("I", 4)}
+
+
+def pcd(fields, rows):
+    """fields: (name, struct code) each."""
+    head = (f"# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\nFIELDS {' '.join(n for n, _ in fields)}\n"
+            f"SIZE {' '.join(str(PCD_TYPE[c][1]) for _, c in fields)}\n"
+            f"TYPE {' '.join(PCD_TYPE[c][0] for _, c in fields)}\nCOUNT {' '.join('1' for _ in fields)}\n"
+            f"WIDTH {len(rows)}\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS {len(rows)}\nDATA binary\n")
+    packer = struct.Struct("<" + "".join(c for _, c in fields))
+    return head.encode() + b"".join(packer.pack(*row) for row in rows)
+
+
+def las(scale, offset, points):
+    """LAS 1.2, point format 2. points: (X, Y, Z, intensity, r, g, b), integers."""
+    lattice = [[p[d] for p in points] for d in range(3)]
+    bounds = [v * scale + offset[d] for d in range(3) for v in (max(lattice[d]), min(lattice[d]))]
+    head = struct.pack("<4sHHIHH8sBB32s32sHHHIIBHI5I3d3d6d", b"LASF", 0, 0, 0, 0, 0, bytes(8), 1, 2, b"made by rule",
+                       b"make_golden.py", 1, 2026, 227, 227, 0, 2, 26, len(points), len(points), 0, 0, 0, 0,
+                       scale, scale, scale, *offset, *bounds)
+    return head + b"".join(struct.pack("<3iHBBbBH3H", *p[:4], 0x09, 2, 0, 0, 7, *p[4:]) for p in points)
+
+
+def room(r, count, offset=(0, 0, 0), noise=0.004):
+    """Points of a floor, two walls and the air between, each with a colour and a brightness that follow the place."""
+    for _ in range(count):
+        p = [r.random() * side for side in (4, 3, 2)]
+        kind = r.random()
+        if kind < 0.9:
+            p[2 if kind < 0.4 else 0 if kind < 0.65 else 1] = (r.random() - 0.5) * noise
+        rgb = [int(120 + 60 * (p[d] % 1.5) + 8 * r.random()) for d in range(3)]
+        yield [a + b for a, b in zip(p, offset)], rgb, 10 * p[0] + r.random()
+
+
+def packed(rgb):
+    return rgb[0] << 16 | rgb[1] << 8 | rgb[2]
+
+
+XYZ = (("x", "f"), ("y", "f"), ("z", "f"))
+XYZ_DOUBLE = (("x", "d"), ("y", "d"), ("z", "d"))
+COLORED = XYZ + (("rgb", "I"), ("intensity", "f"))
+
+
+def colored_room(count=900):
+    return pcd(COLORED, [(*p, packed(c), i) for p, c, i in room(random.Random(1), count)])
+
+
+def crowded_room():
+    """Many points a voxel, so that counts are large."""
+    return pcd(XYZ, [tuple(p) for p, _, _ in room(random.Random(2), 3000, noise=0.001)] + [(1, 1, 1)] * 300)
+
+
+def dust():
+    """No surface anywhere: the lowest levels of the tree are noise."""
+    r = random.Random(3)
+    return pcd(XYZ, [[r.random() * 5 for _ in range(3)] for _ in range(700)])
+
+
+def utm_room():
+    rows = room(random.Random(4), 700, offset=(456789.125, 5428123.5, 312.75))
+    return pcd(XYZ_DOUBLE + (("intensity", "f"),), [(*p, i) for p, _, i in rows])
+
+
+def odd_scan():
+    """Missing returns, infinities, negative zeros, repeats, and a channel of each kind."""
+    r, rows = random.Random(5), []
+    for k, (p, c, i) in enumerate(room(r, 500, offset=(-1, -1, -0.5))):
+        if k % 17 == 0:
+            p = [NAN, NAN, NAN]
+        elif k % 41 == 0:
+            p = [p[0], INFINITY, -INFINITY]
+        elif k % 23 == 0:
+            p = [0.0, -0.0, p[2] * 1e-20]
+        elif k % 11 == 0:
+            p = list(rows[-1][:3])
+        rows.append((*p, packed(c), i, k % 16, r.choice((1, 2, 2, 2, 6)), r.randrange(-100, 100), -k * k, 1.6e9 + k / 8192))
+    fields = COLORED + (("ring", "H"), ("label", "B"), ("tilt", "b"), ("range", "i"), ("time", "d"))
+    return pcd(fields, rows)
+
+
+def utm_decimals():
+    """Doubles that were millimetres in a text, some of which are not."""
+    rows = []
+    for k, (p, _, _) in enumerate(room(random.Random(6), 600, offset=(-456789, 5428123, 312))):
+        rows.append([v if k % 50 == 0 else round(v, 3) for v in p])
+    return pcd(XYZ_DOUBLE, rows)
+
+
+def survey():
+    offset = (300000.0, 4000000.0, 0.0)
+    points = [(*(int(v * 1000) for v in p), int(i * 50), *(257 * v for v in c))
+              for p, c, i in room(random.Random(7), 600, offset=(1, 2, 3))]
+    return las(0.001, offset, points)
+
+
+# name: (name of the input, its maker, flags)
+CLOUDS = {
+    "points_fast": ("a.pcd", colored_room, "--max-error 0.005 --effort fast"),
+    "points_default": ("a.pcd", colored_room, "--max-error 0.005"),
+    "points_high": ("a.pcd", colored_room, "--rms 0.01 --effort high --color-error 3"),
+    "points_exact_channels": ("a.pcd", colored_room, "--rms 0.01 --color-error 0"),
+    "points_tiles": ("a.pcd", colored_room, "--max-error 0.02 --tile-size 1"),
+    "points_counts": ("a.pcd", crowded_room, "--max-error 0.02"),
+    "points_no_counts": ("a.pcd", crowded_room, "--rms 0.02 --no-counts"),
+    "points_dust": ("a.pcd", dust, "--max-error 0.0005"),
+    "points_one": ("a.pcd", lambda: pcd(COLORED, [(1, 2, 3, 0x102030, 0.5)]), "--max-error 0.01"),
+    "points_utm": ("a.pcd", utm_room, "--max-error 0.001"),
+    "points_survey": ("a.las", survey, "--rms 0.005"),
+    "lossless_odd": ("a.pcd", odd_scan, "--lossless"),
+    "lossless_odd_order": ("a.pcd", odd_scan, "--lossless --keep-order --effort high"),
+    "lossless_utm": ("a.pcd", utm_decimals, "--lossless"),
+    "lossless_utm_floats": ("a.pcd", utm_room, "--lossless --effort fast"),
+    "lossless_survey": ("a.las", survey, "--lossless"),
+}
+
+
+def make(program, name, folder):
+    input_name, maker, flags = CLOUDS[name]
+    source, archive = folder / input_name, HERE / f"{name}.mapc"
+    source.write_bytes(maker())
+    subprocess.run([program, "compress", source, "-o", archive, *flags.split(), "--threads", "1", "--progress", "none",
+                    "--force"], check=True)
+    return read_tile.digest(archive.read_bytes())
+
+
+def main():
+    arguments = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    arguments.add_argument("program")
+    arguments.add_argument("--replace", action="store_true")
+    options = arguments.parse_args()
+    listing = HERE / "hashes.json"
+    hashes = json.loads(listing.read_text()) if listing.exists() else {}
+    with tempfile.TemporaryDirectory() as folder:
+        for name in CLOUDS:
+            if options.replace or not (HERE / f"{name}.mapc").exists():
+                hashes[name] = make(options.program, name, pathlib.Path(folder))
+    listing.write_text(json.dumps(hashes, indent=1, sort_keys=True) + "\n")
+
+
+if __name__ == "__main__":
+    main()
