@@ -274,8 +274,8 @@ class Job {
     return revision.ok() ? Status{} : Status(revision.error());
   }
 
-  // A cube is split at 1.5 times this, so tiles hold 50,000 to 100,000 points. Smaller ones cost bits at their borders.
-  static constexpr double kTilePoints = 130000;
+  // A cube is split at 1.5 times this. Smaller tiles cost bits at their borders, larger ones time to the first point.
+  static constexpr double kTilePoints = 100000;
   // The paper's planes are those of a whole scan: as few cuts as memory and time allow.
   static constexpr double kPaperTilePoints = 1000000;
 

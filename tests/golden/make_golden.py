@@ -124,7 +124,7 @@ CLOUDS = {
     "points_default": ("a.pcd", colored_room, "--max-error 0.005"),
     "points_high": ("a.pcd", colored_room, "--rms 0.01 --effort high --color-error 3"),
     "points_exact_channels": ("a.pcd", colored_room, "--rms 0.01 --color-error 0"),
-    "points_tiles": ("a.pcd", colored_room, "--max-error 0.02 --tile-size 1"),
+    "points_tiles": ("a.pcd", colored_room, "--max-error 0.02 --tile-size 2"),
     "points_counts": ("a.pcd", crowded_room, "--max-error 0.02"),
     "points_no_counts": ("a.pcd", crowded_room, "--rms 0.02 --no-counts"),
     "points_dust": ("a.pcd", dust, "--max-error 0.0005"),
