@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The few calls that a program needs: write a map, open it, read a region, measure. Everything else is behind these.
+// The few calls that a program needs: write a map, open it, read a region, measure. Everything else is behind
+// these.
 //
 //   write_map(cloud, path, options)   a cloud in memory -> an archive           (slam_adapter/compress.hpp)
 //   compress_files(inputs, path, ...) files of points -> an archive, any size

@@ -3,6 +3,7 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <filesystem>
 #include <set>
@@ -52,7 +53,8 @@ TileSettings tile_settings(const CompressOptions& options) {
   return s;
 }
 
-/// Whole-map errors from those of the tiles: sums weighted by points, so that no tile has to be looked at again.
+/// Whole-map errors from those of the tiles: sums weighted by points, so that no tile has to be looked at
+/// again.
 class ErrorSum {
  public:
   void add(const EncodedTile& t) {
@@ -72,7 +74,8 @@ class ErrorSum {
   double points_ = 0, squares_ = 0, color_ = 0, density_ = 0, max_axis_ = 0;
 };
 
-/// One compression from the tiles on: may be repeated with a finer lattice if the first one misses an RMS promise.
+/// One compression from the tiles on: may be repeated with a finer lattice if the first one misses an RMS
+/// promise.
 class Job {
  public:
   Job(PointSource& source, const std::string& path, const CompressOptions& options)
@@ -101,7 +104,8 @@ class Job {
     s.stop = options_.stop;
     MAPCODEC_ASSIGN(survey_, survey(source_, s));
     if (survey_.dropped > 0) {
-      report_.warnings.push_back(std::to_string(survey_.dropped) + " points without a finite position were dropped");
+      report_.warnings.push_back(std::to_string(survey_.dropped) +
+                                 " points without a finite position were dropped");
     }
     report_.warnings.insert(report_.warnings.end(), survey_.warnings.begin(), survey_.warnings.end());
     return {};
@@ -114,14 +118,16 @@ class Job {
     const double step = smallest_step();
     if (step > 0) plan.max_side_m = step * double(1 << 20);
     MAPCODEC_ASSIGN(plan_, plan_tiles(survey_, plan));
-    MAPCODEC_ASSIGN(schema_, choose_schema(survey_, options_, plan_.origin(), plan_.tile_size_m(), report_.warnings));
+    MAPCODEC_ASSIGN(schema_,
+                    choose_schema(survey_, options_, plan_.origin(), plan_.tile_size_m(), report_.warnings));
     TileSetSettings s;
     s.memory_budget_bytes = memory_budget(options_);
     s.temp_dir = options_.temp_folder.empty() ? folder_of(path_) : options_.temp_folder;
     s.arena = &arena_;
     s.progress = options_.progress;
     s.stop = options_.stop;
-    auto tiles = survey_.cloud ? build_tiles(std::move(*survey_.cloud), plan_, s) : build_tiles(source_, plan_, s);
+    auto tiles =
+        survey_.cloud ? build_tiles(std::move(*survey_.cloud), plan_, s) : build_tiles(source_, plan_, s);
     survey_.cloud.reset();
     if (!tiles.ok()) return tiles.error();
     tiles_ = std::make_unique<TileSet>(std::move(tiles).value());
@@ -130,7 +136,8 @@ class Job {
 
   /// A voxel side that the promise will not go below, 0 where there is none.
   [[nodiscard]] double smallest_step() const {
-    if (options_.promise == PromiseKind::max_error || options_.promise == PromiseKind::rms) return options_.promise_m;
+    if (options_.promise == PromiseKind::max_error || options_.promise == PromiseKind::rms)
+      return options_.promise_m;
     return 0;
   }
 
@@ -149,8 +156,10 @@ class Job {
       report_.tiles_seconds = lap(at);
       MAPCODEC_ASSIGN(const bool kept, is_kept_or_adjust());
       if (kept) break;
-      if (i + 1 == kTries) return make_error(ErrorCode::kPromiseBroken, "no voxel size was found that keeps the promise");
+      if (i + 1 == kTries)
+        return make_error(ErrorCode::kPromiseBroken, "no voxel size was found that keeps the promise");
     }
+    say_if_finer_for_color();
     auto at = Clock::now();
     MAPCODEC_TRY(commit());
     report_.commit_seconds = lap(at);
@@ -168,7 +177,7 @@ class Job {
     const auto color = bounded_color();
     if (color && schema_.step_m > 0 && total.color_error > schema_.channels[*color].bound &&
         schema_.coordinates.kind != CoordinateFormat::Kind::fixed) {
-      schema_.step_m *= 0.7;
+      schema_.step_m *= std::clamp(schema_.channels[*color].bound / total.color_error, 0.6, 0.95);
       return false;
     }
     return true;
@@ -176,23 +185,29 @@ class Job {
 
   [[nodiscard]] std::optional<std::size_t> bounded_color() const {
     for (std::size_t i = 0; i < schema_.channels.size(); ++i) {
-      if (schema_.channels[i].info.name == "rgb" && schema_.channels[i].kept == ChannelKept::bounded) return i;
+      if (schema_.channels[i].info.name == "rgb" && schema_.channels[i].kept == ChannelKept::bounded)
+        return i;
     }
     return std::nullopt;
   }
 
-  /// Colours keep their bound too: voxels that hold too different ones are too large, whatever the positions allow.
+  /// Colours keep their bound too: voxels that hold too different ones are too large, whatever the positions
+  /// allow.
   Status refine_for_color() {
     const auto color = bounded_color();
     const bool lattice = schema_.promise == PromiseKind::rms || schema_.promise == PromiseKind::max_error;
-    if (!color || !lattice || has_target() || schema_.coordinates.kind == CoordinateFormat::Kind::fixed) return {};
-    MAPCODEC_ASSIGN(const double step, find_step_for_color(*color, *tiles_, schema_, arena_));
-    if (step < schema_.step_m) {
-      report_.warnings.push_back("voxels are " + millimetres(step) + " instead of " + millimetres(schema_.step_m) +
-                                 ", so that colours keep their bound (a larger --color-error makes the map smaller)");
-    }
-    schema_.step_m = step;
+    if (!color || !lattice || has_target() || schema_.coordinates.kind == CoordinateFormat::Kind::fixed)
+      return {};
+    position_step_ = schema_.step_m;
+    MAPCODEC_ASSIGN(schema_.step_m, find_step_for_color(*color, *tiles_, schema_, arena_));
     return {};
+  }
+
+  void say_if_finer_for_color() {
+    if (!(schema_.step_m < position_step_)) return;
+    report_.warnings.push_back(
+        "voxels are " + millimetres(schema_.step_m) + " instead of " + millimetres(position_step_) +
+        ", so that colours keep their bound (a larger --color-error makes the map smaller)");
   }
 
   static std::string millimetres(double m) {
@@ -274,7 +289,8 @@ class Job {
     return revision.ok() ? Status{} : Status(revision.error());
   }
 
-  // A cube is split at 1.5 times this. Smaller tiles cost bits at their borders, larger ones time to the first point.
+  // A cube is split at 1.5 times this. Smaller tiles cost bits at their borders, larger ones time to the
+  // first point.
   static constexpr double kTilePoints = 100000;
   // The paper's planes are those of a whole scan: as few cuts as memory and time allow.
   static constexpr double kPaperTilePoints = 1000000;
@@ -291,12 +307,14 @@ class Job {
   ErrorSum errors_;
   Box bounds_;
   std::uint64_t payload_bytes_ = 0;
-  double correction_ = 1;  // of the target size
+  double correction_ = 1;     // of the target size
+  double position_step_ = 0;  // what the positions' promise alone would allow
   int target_tries_ = 0;
   CompressReport report_;
 };
 
-Result<std::unique_ptr<PointSource>> open_inputs(const std::vector<std::string>& inputs, const ReadOptions& options) {
+Result<std::unique_ptr<PointSource>> open_inputs(const std::vector<std::string>& inputs,
+                                                 const ReadOptions& options) {
   std::vector<std::unique_ptr<PointSource>> sources;
   for (const std::string& path : inputs) {
     MAPCODEC_ASSIGN(std::unique_ptr<PointSource> source, open_source(path, options));
@@ -308,7 +326,8 @@ Result<std::unique_ptr<PointSource>> open_inputs(const std::vector<std::string>&
 
 }  // namespace
 
-Result<CompressReport> compress(PointSource& source, const std::string& path, const CompressOptions& options) {
+Result<CompressReport> compress(PointSource& source, const std::string& path,
+                                const CompressOptions& options) {
   if (!options.keep_order) return Job(source, path, options).run();
   OrderSource ordered(source);
   return Job(ordered, path, options).run();

@@ -15,21 +15,21 @@ namespace mapcodec {
 
 struct CompressOptions {
   PromiseKind promise = PromiseKind::rms;
-  double promise_m = 0.01;                    ///< rms or max_error [m]
-  std::optional<double> target_bits_per_point; ///< find the promise (rms) that gives this size
-  std::optional<double> target_ratio;          ///< the same, as archive bytes / raw bytes
-  double color_error = 10;                    ///< mean RGB distance allowed, 0..255; 0 = exact
-  std::vector<std::string> channels{"all"};   ///< "all", "none" or names
-  double tile_size_m = 0;                     ///< 0: from the density, about 100,000 points a tile
+  double promise_m = 0.01;                      ///< rms or max_error [m]
+  std::optional<double> target_bits_per_point;  ///< find the promise (rms) that gives this size
+  std::optional<double> target_ratio;           ///< the same, as archive bytes / raw bytes
+  double color_error = 10;                      ///< mean RGB distance allowed, 0..255; 0 = exact
+  std::vector<std::string> channels{"all"};     ///< "all", "none" or names
+  double tile_size_m = 0;                       ///< 0: from the density, about 100,000 points a tile
   Effort effort = Effort::standard;
-  bool keep_order = false;                    ///< lossless: also the order of points
-  bool keep_counts = true;                    ///< false: points in one voxel become one
+  bool keep_order = false;  ///< lossless: also the order of points
+  bool keep_counts = true;  ///< false: points in one voxel become one
   PaperSettings paper;
-  double unit_m = 1;                          ///< metres per unit of the input files (3DTK's centimetres: 0.01)
-  int threads = 0;                            ///< 0: all
-  std::uint64_t max_memory_bytes = 0;         ///< 0: half of the machine's memory
-  std::string temp_folder;                    ///< spill files; empty: the output's folder
-  std::uint64_t input_bytes = 0;              ///< of the source, for the record
+  double unit_m = 1;                   ///< metres per unit of the input files (3DTK's centimetres: 0.01)
+  int threads = 0;                     ///< 0: all
+  std::uint64_t max_memory_bytes = 0;  ///< 0: half of the machine's memory
+  std::string temp_folder;             ///< spill files; empty: the output's folder
+  std::uint64_t input_bytes = 0;       ///< of the source, for the record
   bool overwrite = false;
   ProgressCallback progress;
   const std::atomic<bool>* stop = nullptr;
@@ -37,23 +37,23 @@ struct CompressOptions {
 
 struct CompressReport {
   std::uint64_t points = 0, dropped_points = 0;
-  double seconds = 0;                     ///< wall time of everything
+  double seconds = 0;  ///< wall time of everything
   double survey_seconds = 0, tiling_seconds = 0, tiles_seconds = 0, commit_seconds = 0;
-  std::uint64_t geometry_bytes = 0;       ///< of the tiles, without channels
-  std::vector<double> tile_seconds;       ///< encoding time of each tile on its core, in Morton order
+  std::uint64_t geometry_bytes = 0;  ///< of the tiles, without channels
+  std::vector<double> tile_seconds;  ///< encoding time of each tile on its core, in Morton order
   int threads = 0;
-  std::vector<std::string> warnings;      ///< what was dropped, coarsened or doubtful; one sentence each
+  std::vector<std::string> warnings;  ///< what was dropped, coarsened or doubtful; one sentence each
 };
 
-/// Compresses all points of `source` into a new archive at `path` (written beside it, then renamed: there is never a half
-/// file). The same source and options give the same bytes for any number of threads.
-/// Errors: those of the source; Empty (no finite point); InvalidArgument; CannotWrite; Cancelled.
+/// Compresses all points of `source` into a new archive at `path` (written beside it, then renamed: there is
+/// never a half file). The same source and options give the same bytes for any number of threads. Errors:
+/// those of the source; Empty (no finite point); InvalidArgument; CannotWrite; Cancelled.
 [[nodiscard]] Result<CompressReport> compress(PointSource& source, const std::string& path,
                                               const CompressOptions& options);
 
 /// The same for files of any supported format, together one map.
-[[nodiscard]] Result<CompressReport> compress_files(const std::vector<std::string>& inputs, const std::string& path,
-                                                    CompressOptions options);
+[[nodiscard]] Result<CompressReport> compress_files(const std::vector<std::string>& inputs,
+                                                    const std::string& path, CompressOptions options);
 
 /// Bytes that the ratio refers to: 12 per xyz plus the kept channels (rgb with alpha: 4).
 [[nodiscard]] std::uint64_t raw_bytes_per_point(const MapSchema& schema);

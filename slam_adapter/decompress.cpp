@@ -8,7 +8,9 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-double seconds_since(Clock::time_point begin) { return std::chrono::duration<double>(Clock::now() - begin).count(); }
+double seconds_since(Clock::time_point begin) {
+  return std::chrono::duration<double>(Clock::now() - begin).count();
+}
 
 bool keeps_order(const MapSchema& schema) {
   for (const ChannelSchema& c : schema.channels) {
@@ -26,10 +28,11 @@ std::uint64_t points_of_tiles(const MapFile& map, const Region& region) {
   return points;
 }
 
-/// All points at once: for sorting them (the price of --keep-order), and for small regions, whose tiles are then decoded once
-/// instead of a first time for their count.
-Status write_at_once(const MapFile& map, const std::string& path, const Region& region, const ReadSettings& settings,
-                     const WriteOptions& write, Clock::time_point begin, DecompressReport& report) {
+/// All points at once: for sorting them (the price of --keep-order), and for small regions, whose tiles are
+/// then decoded once instead of a first time for their count.
+Status write_at_once(const MapFile& map, const std::string& path, const Region& region,
+                     const ReadSettings& settings, const WriteOptions& write, Clock::time_point begin,
+                     DecompressReport& report) {
   PointCloud cloud = map.schema().layout();
   MAPCODEC_TRY(map.read(region, settings, [&](PointCloud&& tile) {
     if (cloud.empty() && !tile.empty()) report.first_point_seconds = seconds_since(begin);
@@ -44,11 +47,13 @@ Status write_at_once(const MapFile& map, const std::string& path, const Region& 
   return sink->finish();
 }
 
-Status write_tiles(const MapFile& map, const std::string& path, const Region& region, const ReadSettings& settings,
-                   const WriteOptions& write, Clock::time_point begin, DecompressReport& report) {
+Status write_tiles(const MapFile& map, const std::string& path, const Region& region,
+                   const ReadSettings& settings, const WriteOptions& write, Clock::time_point begin,
+                   DecompressReport& report) {
   MAPCODEC_ASSIGN(const std::uint64_t count, map.count(region, settings));
   if (count == 0) return make_error(ErrorCode::kEmpty, "no point lies in the asked region");
-  MAPCODEC_ASSIGN(const std::unique_ptr<PointSink> sink, open_sink(path, map.schema().layout(), count, write));
+  MAPCODEC_ASSIGN(const std::unique_ptr<PointSink> sink,
+                  open_sink(path, map.schema().layout(), count, write));
   MAPCODEC_TRY(map.read(region, settings, [&](PointCloud&& cloud) -> Status {
     if (report.points == 0 && !cloud.empty()) report.first_point_seconds = seconds_since(begin);
     report.points += cloud.size();
@@ -59,13 +64,14 @@ Status write_tiles(const MapFile& map, const std::string& path, const Region& re
 
 }  // namespace
 
-Result<DecompressReport> decompress(const std::string& map_path, const std::string& path, const Region& region,
-                                    std::optional<std::uint64_t> revision, const ReadSettings& settings,
-                                    const WriteOptions& write) {
+Result<DecompressReport> decompress(const std::string& map_path, const std::string& path,
+                                    const Region& region, std::optional<std::uint64_t> revision,
+                                    const ReadSettings& settings, const WriteOptions& write) {
   const auto begin = Clock::now();
   DecompressReport report;
   MAPCODEC_ASSIGN(const MapFile map, MapFile::open(map_path, revision));
-  const bool at_once = keeps_order(map.schema()) || (!region.everything() && points_of_tiles(map, region) <= kAtOnce);
+  const bool at_once =
+      keeps_order(map.schema()) || (!region.everything() && points_of_tiles(map, region) <= kAtOnce);
   MAPCODEC_TRY((at_once ? write_at_once : write_tiles)(map, path, region, settings, write, begin, report));
   report.tiles_read = map.tiles_in(region).size();
   report.bytes_read = map.archive().bytes_read();

@@ -19,13 +19,15 @@ PointCloud inside(PointCloud cloud, const Region& region) {
   return keep.size() == cloud.size() ? std::move(cloud) : cloud.gather(keep);
 }
 
-/// A payload that passed its checksum and still does not decode means a damaged archive, whatever the decoder calls it.
+/// A payload that passed its checksum and still does not decode means a damaged archive, whatever the decoder
+/// calls it.
 Error damaged(const Error& e) {
   if (e.code == ErrorCode::kCancelled || e.code == ErrorCode::kCannotWrite) return e;
   return make_error(ErrorCode::kArchiveDamaged, e.message, e.offset);
 }
 
-std::vector<std::size_t> border_tiles(const MapFile& map, const Region& region, std::uint64_t& points_inside) {
+std::vector<std::size_t> border_tiles(const MapFile& map, const Region& region,
+                                      std::uint64_t& points_inside) {
   std::vector<std::size_t> border;
   for (const std::size_t i : map.tiles_in(region)) {
     const TileRecord& tile = map.archive().tiles()[i];
@@ -111,8 +113,9 @@ std::vector<std::size_t> MapFile::tiles_in(const Region& region) const {
 Result<Bytes> MapFile::fetch(std::size_t index) const {
   const std::vector<SegmentRef>& segments = archive_->tiles()[index].segments;
   if (segments.size() != 1) {
-    return make_error(ErrorCode::kUnsupported, "a tile of " + std::to_string(segments.size()) +
-                                                   " segments: this version reads maps that were not updated in place");
+    return make_error(ErrorCode::kUnsupported,
+                      "a tile of " + std::to_string(segments.size()) +
+                          " segments: this version reads maps that were not updated in place");
   }
   return archive_->read(segments.front());
 }
@@ -145,21 +148,23 @@ Status decode_each(const MapFile& map, const std::vector<std::size_t>& tiles, co
 Result<std::uint64_t> MapFile::count(const Region& region, const ReadSettings& settings) const {
   std::uint64_t total = 0;
   const std::vector<std::size_t> border = border_tiles(*this, region, total);
-  MAPCODEC_TRY(decode_each(*this, border, settings, [this](std::size_t i) { return fetch(i); },
-                           [&](std::size_t, PointCloud&& cloud) {
-                             total += inside(std::move(cloud), region).size();
-                             return Status{};
-                           }));
+  MAPCODEC_TRY(decode_each(
+      *this, border, settings, [this](std::size_t i) { return fetch(i); },
+      [&](std::size_t, PointCloud&& cloud) {
+        total += inside(std::move(cloud), region).size();
+        return Status{};
+      }));
   return total;
 }
 
 Status MapFile::read(const Region& region, const ReadSettings& settings,
                      const std::function<Status(PointCloud&&)>& sink) const {
-  return decode_each(*this, tiles_in(region), settings, [this](std::size_t i) { return fetch(i); },
-                     [&](std::size_t i, PointCloud&& cloud) {
-                       const bool whole = region.contains(archive_->tiles()[i].bounds);
-                       return sink(whole ? std::move(cloud) : inside(std::move(cloud), region));
-                     });
+  return decode_each(
+      *this, tiles_in(region), settings, [this](std::size_t i) { return fetch(i); },
+      [&](std::size_t i, PointCloud&& cloud) {
+        const bool whole = region.contains(archive_->tiles()[i].bounds);
+        return sink(whole ? std::move(cloud) : inside(std::move(cloud), region));
+      });
 }
 
 Result<PointCloud> MapFile::read(const Region& region, const ReadSettings& settings) const {

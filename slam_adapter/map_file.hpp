@@ -71,7 +71,8 @@ class MapFile {
   [[nodiscard]] std::vector<std::size_t> tiles_in(const Region& region) const;
   /// Number of points in `region`: only tiles on its border are decoded.
   [[nodiscard]] Result<std::uint64_t> count(const Region& region, const ReadSettings& settings = {}) const;
-  /// Hands the points of `region` to `sink`, tile by tile in Morton order; memory is bounded by the tiles in flight.
+  /// Hands the points of `region` to `sink`, tile by tile in Morton order; memory is bounded by the tiles in
+  /// flight.
   [[nodiscard]] Status read(const Region& region, const ReadSettings& settings,
                             const std::function<Status(PointCloud&&)>& sink) const;
   /// The points of `region`, together.

@@ -5,13 +5,16 @@
 
 namespace mapcodec {
 
-/// Another source with one more channel: each point's place in it (`kOrderChannel`, u64). The source must outlive it.
+/// Another source with one more channel: each point's place in it (`kOrderChannel`, u64). The source must
+/// outlive it.
 class OrderSource final : public PointSource {
  public:
   explicit OrderSource(PointSource& source);
 
   [[nodiscard]] const PointCloud& layout() const override { return layout_; }
-  [[nodiscard]] std::optional<std::uint64_t> announced_points() const override { return source_.announced_points(); }
+  [[nodiscard]] std::optional<std::uint64_t> announced_points() const override {
+    return source_.announced_points();
+  }
   Result<bool> next(PointCloud& block) override;
   Status rewind() override;
   [[nodiscard]] std::uint64_t dropped_points() const override { return source_.dropped_points(); }

@@ -91,12 +91,14 @@ Result<double> find_step_for_bits(double bits_per_point, const TileSet& tiles, c
     (bits > bits_per_point ? fine : coarse) = middle;
   }
   if (coarse > side * kCoarsest * 0.99) {
-    return make_error(ErrorCode::kInvalidArgument, "the asked size cannot be reached: channels take more than that alone");
+    return make_error(ErrorCode::kInvalidArgument,
+                      "the asked size cannot be reached: channels take more than that alone");
   }
   return coarse;
 }
 
-Result<double> find_step_for_color(std::size_t channel, const TileSet& tiles, const MapSchema& schema, Arena& arena) {
+Result<double> find_step_for_color(std::size_t channel, const TileSet& tiles, const MapSchema& schema,
+                                   Arena& arena) {
   MAPCODEC_ASSIGN(const std::vector<PointCloud> sample, sample_tiles(tiles));
   // Room below the bound for what coding itself loses, and for tiles that the sample did not show.
   const double wanted = 0.8 * schema.channels[channel].bound;

@@ -30,7 +30,8 @@ ChannelSchema choose_channel(const ChannelInfo& info, const std::optional<Bytes>
     c.constant = *constant;
   } else if (options.promise == PromiseKind::paper && !can_be_bounded_color(info)) {
     c.kept = ChannelKept::dropped;
-  } else if (options.promise != PromiseKind::lossless && can_be_bounded_color(info) && options.color_error > 0) {
+  } else if (options.promise != PromiseKind::lossless && can_be_bounded_color(info) &&
+             options.color_error > 0) {
     c.kept = ChannelKept::bounded;
     c.bound = options.color_error;
   }
@@ -42,8 +43,8 @@ Status check_names(const PointCloud& layout, const std::vector<std::string>& ask
     if (name == "all" || name == "none" || layout.find(name) != nullptr) continue;
     std::string known;
     for (const Channel& c : layout.channels) known += (known.empty() ? "" : ", ") + c.info.name;
-    return make_error(ErrorCode::kInvalidArgument,
-                      "there is no channel '" + name + "' (there is: " + (known.empty() ? "none" : known) + ")");
+    return make_error(ErrorCode::kInvalidArgument, "there is no channel '" + name + "' (there is: " +
+                                                       (known.empty() ? "none" : known) + ")");
   }
   return {};
 }
@@ -59,7 +60,8 @@ void choose_lattice(const Survey& survey, const CompressOptions& options, MapSch
   schema.step_m = lattice.step_m;
 }
 
-void say_what_is_dropped(const MapSchema& schema, const CompressOptions& options, std::vector<std::string>& warnings) {
+void say_what_is_dropped(const MapSchema& schema, const CompressOptions& options,
+                         std::vector<std::string>& warnings) {
   for (const ChannelSchema& c : schema.channels) {
     if (c.kept != ChannelKept::dropped) continue;
     const bool resampled = options.promise == PromiseKind::paper && is_asked(c.info.name, options.channels);
@@ -83,7 +85,8 @@ Result<MapSchema> choose_schema(const Survey& survey, const CompressOptions& opt
   schema.coordinates = survey.layout.coordinates;
   choose_lattice(survey, options, schema);
   for (std::size_t i = 0; i < survey.layout.channels.size(); ++i) {
-    schema.channels.push_back(choose_channel(survey.layout.channels[i].info, survey.constant_channels[i], options));
+    schema.channels.push_back(
+        choose_channel(survey.layout.channels[i].info, survey.constant_channels[i], options));
   }
   say_what_is_dropped(schema, options, warnings);
   return schema;

@@ -10,7 +10,8 @@ namespace mapcodec {
 
 /// Decides lattice and channels. What will not be kept as asked is added to `warnings`.
 /// Errors: InvalidArgument (unknown channel name); Empty (no finite point).
-[[nodiscard]] Result<MapSchema> choose_schema(const Survey& survey, const CompressOptions& options, const Vec3& origin,
-                                              double tile_size_m, std::vector<std::string>& warnings);
+[[nodiscard]] Result<MapSchema> choose_schema(const Survey& survey, const CompressOptions& options,
+                                              const Vec3& origin, double tile_size_m,
+                                              std::vector<std::string>& warnings);
 
 }  // namespace mapcodec

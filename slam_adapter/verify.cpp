@@ -7,7 +7,8 @@
 namespace mapcodec {
 namespace {
 
-Result<std::unique_ptr<PointSource>> open_originals(const std::vector<std::string>& paths, bool keep_nonfinite) {
+Result<std::unique_ptr<PointSource>> open_originals(const std::vector<std::string>& paths,
+                                                    bool keep_nonfinite) {
   std::vector<std::unique_ptr<PointSource>> sources;
   for (const std::string& path : paths) {
     ReadOptions options;
@@ -28,8 +29,9 @@ Result<PointCloud> project(const PointCloud& block, const PointCloud& layout) {
     if (want.info.name == kOrderChannel) continue;
     const Channel* have = block.find(want.info.name);
     if (have == nullptr || have->info != want.info) {
-      return make_error(ErrorCode::kInvalidArgument, "the original has no channel " + want.info.name + " of type " +
-                                                         want.info.type_name() + ", which the map keeps");
+      return make_error(ErrorCode::kInvalidArgument, "the original has no channel " + want.info.name +
+                                                         " of type " + want.info.type_name() +
+                                                         ", which the map keeps");
     }
     r.channels.push_back(*have);
   }
@@ -52,8 +54,8 @@ PointCloud without_order(PointCloud cloud) {
   return cloud;
 }
 
-Status check_lossless(const MapFile& map, const std::vector<std::string>& originals, const ReadSettings& settings,
-                      VerifyOutcome& v) {
+Status check_lossless(const MapFile& map, const std::vector<std::string>& originals,
+                      const ReadSettings& settings, VerifyOutcome& v) {
   MAPCODEC_ASSIGN(const std::unique_ptr<PointSource> source, open_originals(originals, true));
   MAPCODEC_ASSIGN(const MultisetHash original, hash_of(*source, map.schema().layout()));
   MultisetHash decoded;
@@ -62,7 +64,8 @@ Status check_lossless(const MapFile& map, const std::vector<std::string>& origin
     return Status{};
   }));
   v.promise_kept = original == decoded;
-  if (!v.promise_kept) v.findings.push_back("the points differ from the original's, though the promise was lossless");
+  if (!v.promise_kept)
+    v.findings.push_back("the points differ from the original's, though the promise was lossless");
   return {};
 }
 
@@ -77,19 +80,20 @@ void check_promise(const MapSchema& schema, VerifyOutcome& v) {
   const double value = schema.promise_value;
   const std::string limit = " m, promised " + std::to_string(value) + " m";
   if (schema.promise == PromiseKind::max_error) {
-    require(v, e.max_axis_error_m <= value, "largest error along an axis is " + std::to_string(e.max_axis_error_m) + limit);
+    require(v, e.max_axis_error_m <= value,
+            "largest error along an axis is " + std::to_string(e.max_axis_error_m) + limit);
   } else if (schema.promise == PromiseKind::rms) {
     require(v, e.rms_m <= value, "symmetric RMS is " + std::to_string(e.rms_m) + limit);
   }
   for (const ChannelSchema& c : schema.channels) {
     if (c.info.name != "rgb" || c.kept != ChannelKept::bounded) continue;
-    require(v, !(e.color_error > c.bound), "colour error is " + std::to_string(e.color_error) + ", promised " +
-                                               std::to_string(c.bound));
+    require(v, !(e.color_error > c.bound),
+            "colour error is " + std::to_string(e.color_error) + ", promised " + std::to_string(c.bound));
   }
 }
 
-Status check_lossy(const MapFile& map, const std::vector<std::string>& originals, const ReadSettings& settings,
-                   VerifyOutcome& v) {
+Status check_lossy(const MapFile& map, const std::vector<std::string>& originals,
+                   const ReadSettings& settings, VerifyOutcome& v) {
   MAPCODEC_ASSIGN(const std::unique_ptr<PointSource> source, open_originals(originals, false));
   PointCloud original = source->layout(), block;
   for (;;) {
@@ -102,8 +106,8 @@ Status check_lossy(const MapFile& map, const std::vector<std::string>& originals
   TbbRunner runner(settings.arena != nullptr ? *settings.arena : serial);
   MAPCODEC_ASSIGN(v.evaluation, evaluate(original, decoded, runner, {}));
   require(v, map.archive().info().input_points == original.size(),
-          "the map was made of " + std::to_string(map.archive().info().input_points) + " points, the original has " +
-              std::to_string(original.size()));
+          "the map was made of " + std::to_string(map.archive().info().input_points) +
+              " points, the original has " + std::to_string(original.size()));
   check_promise(map.schema(), v);
   return {};
 }
@@ -117,7 +121,8 @@ Result<VerifyOutcome> check_tiles(const MapFile& map, const ReadSettings& settin
     return Status{};
   }));
   if (v.points != map.summary().points) {
-    return make_error(ErrorCode::kArchiveDamaged, "tiles decode to " + std::to_string(v.points) + " points, the index says " +
+    return make_error(ErrorCode::kArchiveDamaged, "tiles decode to " + std::to_string(v.points) +
+                                                      " points, the index says " +
                                                       std::to_string(map.summary().points));
   }
   return v;
@@ -126,7 +131,8 @@ Result<VerifyOutcome> check_tiles(const MapFile& map, const ReadSettings& settin
 }  // namespace
 
 Result<VerifyOutcome> verify_map(const std::string& path, const ReadSettings& settings) {
-  // An archive whose last commit is damaged still opens, at the one before: the whole file is looked at first.
+  // An archive whose last commit is damaged still opens, at the one before: the whole file is looked at
+  // first.
   MAPCODEC_ASSIGN(const VerifyReport report, verify_archive(path));
   if (!report.ok()) return report.findings.front();
   MAPCODEC_ASSIGN(const MapFile map, MapFile::open(path));

@@ -17,7 +17,7 @@ namespace mapcodec {
          (info.scalar == ScalarType::u8 || info.scalar == ScalarType::u16);
 }
 
-/// Decodes a "colour" section (attribute_format.md 3).
+/// Decodes a "colour" section (FORMAT.md 8.5).
 /// @param voxels  Morton-sorted, coordinates below 2^21.
 /// Errors: Truncated, Malformed, LimitExceeded. Threads: pure.
 [[nodiscard]] Result<Channel> decode_color(ByteSpan bytes, const ChannelInfo& info,

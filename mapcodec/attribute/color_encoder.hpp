@@ -5,7 +5,7 @@
 
 namespace mapcodec {
 
-/// Encodes a colour channel (is_color) as a "colour" section (attribute_format.md 3) whose mean distance to
+/// Encodes a colour channel (is_color) as a "colour" section (FORMAT.md 8.5) whose mean distance to
 /// `values`, point by point on a scale of 0..255, is at most `bound` > 0, and as near below it as the search
 /// finds.
 /// @param voxels  Morton-sorted, coordinates below 2^21. Threads: pure.

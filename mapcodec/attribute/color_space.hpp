@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Red, green, blue as brightness and two differences, all in integers (attribute_format.md 3).
+// Red, green, blue as brightness and two differences, all in integers (FORMAT.md 8.5).
 #pragma once
 
 #include <algorithm>

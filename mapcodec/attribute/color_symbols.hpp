@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The symbols of one split (attribute_format.md 3).
+// The symbols of one split (FORMAT.md 8.5).
 #pragma once
 
 #include "mapcodec/attribute/color_walk.hpp"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The hierarchy that colours are transformed over: octree levels above the points, then halvings of the
-// points that share a finest cell (attribute_format.md 3).
+// points that share a finest cell (FORMAT.md 8.5).
 #pragma once
 
 #include <array>

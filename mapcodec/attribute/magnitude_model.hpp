@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // One context of a non-negative integer of up to 64 bits: bit length in unary, two bits below the leading one
 // in the context of the length, the rest raw. Smaller than IntegerModel, since channels keep hundreds of
-// them.
+// them (FORMAT.md 4.4).
 #pragma once
 
 #include <algorithm>

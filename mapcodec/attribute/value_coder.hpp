@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The symbols of a "values" section, written or read: for each point in decoded order, for each component,
-// its integer in the contexts of the points around it (attribute_format.md 2).
+// its integer in the contexts of the points around it (FORMAT.md 8.3).
 #pragma once
 
 #include <algorithm>

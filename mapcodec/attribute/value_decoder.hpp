@@ -10,7 +10,7 @@
 
 namespace mapcodec {
 
-/// Decodes a "values" section (attribute_format.md 2).
+/// Decodes a "values" section (FORMAT.md 8.3).
 /// Errors: Truncated, Malformed, LimitExceeded. Threads: pure.
 [[nodiscard]] Result<Channel> decode_values(ByteSpan bytes, const ChannelInfo& info,
                                             std::span<const VoxelCoord> voxels, const DecodeLimits& limits);

@@ -9,8 +9,7 @@
 
 namespace mapcodec {
 
-/// Encodes any channel, exactly or each value within schema.bound, as a "values" section (attribute_format.md
-/// 2).
+/// Encodes any channel, exactly or each value within schema.bound, as a "values" section (FORMAT.md 8.3).
 /// @param values  in decoded order. @param voxels  of the same points.
 /// Threads: pure; same input, same bytes.
 [[nodiscard]] Bytes encode_values(const ChannelSchema& schema, const Channel& values,

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Number lattices that real files hold: decimals of a text file, binary fractions, millimetres times 0.001f.
+// Number lattices that real files hold: decimals of a text file, binary fractions, millimetres times 0.001f
+// (FORMAT.md 8.1).
 #pragma once
 
 #include <array>

@@ -58,7 +58,8 @@ class ByteReader {
   /// Truncated, naming `what`, if any read so far failed.
   [[nodiscard]] Status status(const char* what) const {
     if (ok_) return {};
-    return make_error(ErrorCode::kTruncated, std::string(what) + " ends too early or holds a broken number", at_);
+    return make_error(ErrorCode::kTruncated, std::string(what) + " ends too early or holds a broken number",
+                      at_);
   }
 
  private:

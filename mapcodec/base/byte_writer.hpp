@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Little-endian fields and varints into a growing buffer (FORMAT.md, Conventions).
+// Little-endian fields and varints into a growing buffer (FORMAT.md 1).
 #pragma once
 
 #include <bit>

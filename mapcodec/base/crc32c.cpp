@@ -32,8 +32,9 @@ std::uint32_t crc32c(ByteSpan bytes, std::uint32_t seed) {
   for (; i + 8 <= bytes.size(); i += 8) {
     c ^= static_cast<std::uint32_t>(bytes[i]) | static_cast<std::uint32_t>(bytes[i + 1]) << 8 |
          static_cast<std::uint32_t>(bytes[i + 2]) << 16 | static_cast<std::uint32_t>(bytes[i + 3]) << 24;
-    c = kTables[7][c & 0xff] ^ kTables[6][(c >> 8) & 0xff] ^ kTables[5][(c >> 16) & 0xff] ^ kTables[4][c >> 24] ^
-        kTables[3][bytes[i + 4]] ^ kTables[2][bytes[i + 5]] ^ kTables[1][bytes[i + 6]] ^ kTables[0][bytes[i + 7]];
+    c = kTables[7][c & 0xff] ^ kTables[6][(c >> 8) & 0xff] ^ kTables[5][(c >> 16) & 0xff] ^
+        kTables[4][c >> 24] ^ kTables[3][bytes[i + 4]] ^ kTables[2][bytes[i + 5]] ^ kTables[1][bytes[i + 6]] ^
+        kTables[0][bytes[i + 7]];
   }
   for (; i < bytes.size(); ++i) c = (c >> 8) ^ kTables[0][(c ^ bytes[i]) & 0xff];
   return ~c;

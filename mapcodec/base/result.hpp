@@ -50,8 +50,8 @@ struct Error {
 template <class T>
 class [[nodiscard]] Result {
  public:
-  Result(T value) : state_(std::in_place_index<0>, std::move(value)) {}          // NOLINT: implicit by design
-  Result(Error error) : state_(std::in_place_index<1>, std::move(error)) {}      // NOLINT: implicit by design
+  Result(T value) : state_(std::in_place_index<0>, std::move(value)) {}      // NOLINT: implicit by design
+  Result(Error error) : state_(std::in_place_index<1>, std::move(error)) {}  // NOLINT: implicit by design
 
   [[nodiscard]] bool ok() const { return state_.index() == 0; }
   explicit operator bool() const { return ok(); }
@@ -102,11 +102,11 @@ using Status = Result<void>;
 }  // namespace mapcodec
 
 /// Returns the error of `expr` from the enclosing function, if it has one.
-#define MAPCODEC_TRY(expr)                                         \
-  do {                                                             \
-    if (auto mapcodec_status_ = (expr); !mapcodec_status_.ok()) {  \
-      return mapcodec_status_.error();                             \
-    }                                                              \
+#define MAPCODEC_TRY(expr)                                        \
+  do {                                                            \
+    if (auto mapcodec_status_ = (expr); !mapcodec_status_.ok()) { \
+      return mapcodec_status_.error();                            \
+    }                                                             \
   } while (false)
 
 #define MAPCODEC_CONCAT_INNER(a, b) a##b

@@ -12,7 +12,8 @@ namespace mapcodec {
 class Runner {
  public:
   virtual ~Runner() = default;
-  virtual void run(std::size_t count, const std::function<void(std::size_t begin, std::size_t end)>& body) = 0;
+  virtual void run(std::size_t count,
+                   const std::function<void(std::size_t begin, std::size_t end)>& body) = 0;
 };
 
 /// The plain one: the whole range, on the caller's thread.

@@ -11,7 +11,18 @@
 namespace mapcodec {
 
 /// The ids are written to archives: never reuse one.
-enum class ScalarType : std::uint8_t { u8 = 1, i8 = 2, u16 = 3, i16 = 4, u32 = 5, i32 = 6, u64 = 7, i64 = 8, f32 = 9, f64 = 10 };
+enum class ScalarType : std::uint8_t {
+  u8 = 1,
+  i8 = 2,
+  u16 = 3,
+  i16 = 4,
+  u32 = 5,
+  i32 = 6,
+  u64 = 7,
+  i64 = 8,
+  f32 = 9,
+  f64 = 10
+};
 
 /// Bytes of one scalar; 0 for an id that is none of the above.
 [[nodiscard]] constexpr std::size_t scalar_size(ScalarType t) {
@@ -26,8 +37,8 @@ enum class ScalarType : std::uint8_t { u8 = 1, i8 = 2, u16 = 3, i16 = 4, u32 = 5
   return i < std::size(kNames) ? kNames[i] : "?";
 }
 
-/// Conventional names: "rgb" (u8x3 or u16x3: red, green, blue), "alpha" (u8), "intensity", "normal" (f32x3, unit),
-/// "time", "ring", "label". Any other name is kept as found.
+/// Conventional names: "rgb" (u8x3 or u16x3: red, green, blue), "alpha" (u8), "intensity", "normal" (f32x3,
+/// unit), "time", "ring", "label". Any other name is kept as found.
 struct ChannelInfo {
   std::string name;
   ScalarType scalar = ScalarType::f32;
@@ -67,16 +78,26 @@ struct Channel {
 template <class F>
 decltype(auto) visit_scalar(ScalarType t, F&& f) {
   switch (t) {
-    case ScalarType::u8: return f(std::uint8_t{});
-    case ScalarType::i8: return f(std::int8_t{});
-    case ScalarType::u16: return f(std::uint16_t{});
-    case ScalarType::i16: return f(std::int16_t{});
-    case ScalarType::u32: return f(std::uint32_t{});
-    case ScalarType::i32: return f(std::int32_t{});
-    case ScalarType::u64: return f(std::uint64_t{});
-    case ScalarType::i64: return f(std::int64_t{});
-    case ScalarType::f32: return f(float{});
-    case ScalarType::f64: break;
+    case ScalarType::u8:
+      return f(std::uint8_t{});
+    case ScalarType::i8:
+      return f(std::int8_t{});
+    case ScalarType::u16:
+      return f(std::uint16_t{});
+    case ScalarType::i16:
+      return f(std::int16_t{});
+    case ScalarType::u32:
+      return f(std::uint32_t{});
+    case ScalarType::i32:
+      return f(std::int32_t{});
+    case ScalarType::u64:
+      return f(std::uint64_t{});
+    case ScalarType::i64:
+      return f(std::int64_t{});
+    case ScalarType::f32:
+      return f(float{});
+    case ScalarType::f64:
+      break;
   }
   return f(double{});
 }

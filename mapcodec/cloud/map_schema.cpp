@@ -37,8 +37,10 @@ Result<ChannelSchema> read_channel(ByteReader& in) {
   c.info.components = in.u8();
   c.kept = static_cast<ChannelKept>(in.u8());
   MAPCODEC_TRY(in.status("map schema"));
-  if (c.info.name.empty() || c.info.stride() == 0) return malformed("channel without name, type or components", in);
-  if (c.kept < ChannelKept::exact || c.kept > ChannelKept::dropped) return malformed("unknown way to keep a channel", in);
+  if (c.info.name.empty() || c.info.stride() == 0)
+    return malformed("channel without name, type or components", in);
+  if (c.kept < ChannelKept::exact || c.kept > ChannelKept::dropped)
+    return malformed("unknown way to keep a channel", in);
   if (c.kept == ChannelKept::bounded) {
     c.bound = in.f64();
     if (!(c.bound > 0) || !std::isfinite(c.bound)) return malformed("channel bound is not positive", in);
@@ -54,7 +56,8 @@ Status check_numbers(const MapSchema& s, const ByteReader& in) {
   if (!is_finite(s.origin) || !is_finite(s.coordinates.scale) || !is_finite(s.coordinates.offset)) {
     return malformed("a coordinate is not finite", in);
   }
-  if (!(s.tile_size_m > 0) || !std::isfinite(s.tile_size_m)) return malformed("tile size is not positive", in);
+  if (!(s.tile_size_m > 0) || !std::isfinite(s.tile_size_m))
+    return malformed("tile size is not positive", in);
   if (!(s.step_m >= 0) || !std::isfinite(s.step_m)) return malformed("step is negative", in);
   if (!(s.promise_value >= 0) || !std::isfinite(s.promise_value)) return malformed("promise is negative", in);
   if (s.promise < PromiseKind::rms || s.promise > PromiseKind::paper) return malformed("unknown promise", in);
@@ -112,7 +115,8 @@ Result<MapSchema> read_schema(ByteSpan bytes, const DecodeLimits& limits) {
   const std::uint64_t count = in.varint();
   MAPCODEC_TRY(in.status("map schema"));
   MAPCODEC_TRY(check_numbers(s, in));
-  if (count > limits.max_channels) return make_error(ErrorCode::kLimitExceeded, "map schema: too many channels", in.offset());
+  if (count > limits.max_channels)
+    return make_error(ErrorCode::kLimitExceeded, "map schema: too many channels", in.offset());
   for (std::uint64_t i = 0; i < count; ++i) {
     MAPCODEC_ASSIGN(ChannelSchema c, read_channel(in));
     s.channels.push_back(std::move(c));

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What all tiles of a map have in common, so that no tile repeats it: the second argument of every tile decoder.
+// What all tiles of a map have in common, so that no tile repeats it: the second argument of every tile
+// decoder.
 #pragma once
 
 #include <vector>

@@ -43,7 +43,8 @@ PointCloud PointCloud::gather(const std::vector<std::uint32_t>& order) const {
   for (std::size_t i = 0; i < order.size(); ++i) r.xyz[i] = xyz[order[i]];
   for (std::size_t c = 0; c < channels.size(); ++c) {
     const std::size_t stride = channels[c].info.stride();
-    for (std::size_t i = 0; i < order.size(); ++i) std::memcpy(r.channels[c].at(i), channels[c].at(order[i]), stride);
+    for (std::size_t i = 0; i < order.size(); ++i)
+      std::memcpy(r.channels[c].at(i), channels[c].at(order[i]), stride);
   }
   return r;
 }

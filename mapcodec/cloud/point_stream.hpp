@@ -24,7 +24,8 @@ class PointSource {
   virtual Result<bool> next(PointCloud& block) = 0;
   /// Starts over from the first point.
   virtual Status rewind() = 0;
-  /// Points left out so far because a coordinate was NaN or infinite (0 where the reader was told to keep them).
+  /// Points left out so far because a coordinate was NaN or infinite (0 where the reader was told to keep
+  /// them).
   [[nodiscard]] virtual std::uint64_t dropped_points() const = 0;
   /// Things a user should hear (each once), such as "float32 cannot hold millimetres at 1e6 m".
   [[nodiscard]] virtual std::vector<std::string> warnings() const { return {}; }

@@ -5,7 +5,9 @@ namespace mapcodec {
 namespace {
 
 /// The axis whose highest differing bit is highest decides (Chan 2002): no interleaving, no width limit.
-bool less_msb(std::uint64_t a, std::uint64_t b) { return a < b && a < (a ^ b); }
+bool less_msb(std::uint64_t a, std::uint64_t b) {
+  return a < b && a < (a ^ b);
+}
 
 std::uint64_t corner(std::int32_t v, std::uint8_t level) {
   // Offset binary, so that negative coordinates sort below positive ones.

@@ -8,8 +8,9 @@
 
 namespace mapcodec {
 
-/// One axis-aligned cube of a map: side = tile_size * 2^level, minimum corner = (x, y, z) * side in the map frame
-/// (plus the map's origin). Tiles of one map do not overlap. `kUnplaced` holds points without a finite position.
+/// One axis-aligned cube of a map: side = tile_size * 2^level, minimum corner = (x, y, z) * side in the map
+/// frame (plus the map's origin). Tiles of one map do not overlap. `kUnplaced` holds points without a finite
+/// position.
 struct TileKey {
   std::int32_t x = 0, y = 0, z = 0;
   std::uint8_t level = 0;
@@ -28,8 +29,8 @@ struct TileKey {
   return {lo, {lo[0] + side, lo[1] + side, lo[2] + side}};
 }
 
-/// Morton order of the tiles' minimum corners; a larger tile before the smaller ones with the same corner. The order in
-/// which tiles are stored and decoded; unplaced tiles come last.
+/// Morton order of the tiles' minimum corners; a larger tile before the smaller ones with the same corner.
+/// The order in which tiles are stored and decoded; unplaced tiles come last.
 [[nodiscard]] std::strong_ordering compare_morton(const TileKey& a, const TileKey& b);
 
 struct MortonLess {
@@ -40,7 +41,8 @@ struct TileKeyHash {
   std::size_t operator()(const TileKey& k) const {
     std::uint64_t h = (std::uint64_t(std::uint32_t(k.x)) * 0x9E3779B97F4A7C15u) ^
                       (std::uint64_t(std::uint32_t(k.y)) * 0xC2B2AE3D27D4EB4Fu) ^
-                      (std::uint64_t(std::uint32_t(k.z)) * 0x165667B19E3779F9u) ^ (std::uint64_t(k.level) << 56);
+                      (std::uint64_t(std::uint32_t(k.z)) * 0x165667B19E3779F9u) ^
+                      (std::uint64_t(k.level) << 56);
     return static_cast<std::size_t>(h ^ (h >> 29));
   }
 };

@@ -35,7 +35,8 @@ struct Box {
     add(b.max);
   }
   [[nodiscard]] bool contains(const Vec3& p) const {
-    return p[0] >= min[0] && p[0] <= max[0] && p[1] >= min[1] && p[1] <= max[1] && p[2] >= min[2] && p[2] <= max[2];
+    return p[0] >= min[0] && p[0] <= max[0] && p[1] >= min[1] && p[1] <= max[1] && p[2] >= min[2] &&
+           p[2] <= max[2];
   }
   [[nodiscard]] bool intersects(const Box& b) const {
     for (std::size_t d = 0; d < 3; ++d) {

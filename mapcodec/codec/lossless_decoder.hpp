@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Decoder of the `lossless` geometry (FORMAT.md, lossless).
+// Decoder of the `lossless` geometry (FORMAT.md 5).
 #pragma once
 
 #include <vector>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The numbers that one axis of a lossless tile can hold, cut into cells (lossless_format.md).
+// The numbers that one axis of a lossless tile can hold, cut into cells (FORMAT.md 5.1).
 #pragma once
 
 #include <bit>

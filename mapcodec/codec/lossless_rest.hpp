@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a lossless tile says about its points beside their cells and plain bits (lossless_format.md 3, 4).
+// What a lossless tile says about its points beside their cells and plain bits (FORMAT.md 5.2, 5.4).
 #pragma once
 
 #include <bit>

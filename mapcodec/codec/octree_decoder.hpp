@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Decoder of the context-coded octree (FORMAT.md, points).
+// Decoder of the context-coded octree (FORMAT.md 6.2).
 #pragma once
 
 #include <vector>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Decoder of the `paper` codec (paper_format.md) [Morell, Orts, Cazorla, Garcia-Rodriguez 2014, Algorithm 2].
+// Decoder of the `paper` codec (FORMAT.md 7) [Morell, Orts, Cazorla, Garcia-Rodriguez 2014, Algorithm 2].
 #pragma once
 
 #include <vector>

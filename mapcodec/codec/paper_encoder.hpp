@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Encoder of the `paper` codec [Morell, Orts, Cazorla, Garcia-Rodriguez, Geometric 3D point cloud
-// compression, Pattern Recognition Letters 2014, Algorithm 1] (paper_format.md).
+// compression, Pattern Recognition Letters 2014, Algorithm 1] (FORMAT.md 7).
 #pragma once
 
 #include "mapcodec/base/bytes.hpp"

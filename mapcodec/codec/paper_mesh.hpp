@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Planes of triangles on an integer lattice, and the contexts their symbols are coded in. Shared by the
-// encoder and the decoder of the `paper` codec (paper_format.md, coded form).
+// encoder and the decoder of the `paper` codec (FORMAT.md 7.2).
 #pragma once
 
 #include <array>

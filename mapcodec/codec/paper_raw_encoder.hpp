@@ -7,8 +7,7 @@
 namespace mapcodec::paper {
 
 /// Writes planes and points as the paper stored them: numPointsPlane, areaPlane, triangles of three float
-/// vertices and one RGB each; the remaining points as floats and RGB (paper_format.md, raw form, after its
-/// first byte).
+/// vertices and one RGB each; the remaining points as floats and RGB (FORMAT.md 7.1).
 /// @param color  of all points of `tile`; nullptr without colour.
 [[nodiscard]] Bytes write_raw(const Extraction& extraction, const PointCloud& tile, const Channel* color,
                               const Vec3& corner, double step_m);

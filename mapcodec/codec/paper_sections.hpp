@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What the two sides of the `paper` codec agree on outside the planes (paper_format.md).
+// What the two sides of the `paper` codec agree on outside the planes (FORMAT.md 7).
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Decoder of the `points` geometry (FORMAT.md, points).
+// Decoder of the `points` geometry (FORMAT.md 6).
 #pragma once
 
 #include <vector>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Encoder of the `points` geometry: every point within half a step per axis (FORMAT.md, points).
+// Encoder of the `points` geometry: every point within half a step per axis (FORMAT.md 6).
 #pragma once
 
 #include <span>

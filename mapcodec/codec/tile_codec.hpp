@@ -29,14 +29,15 @@ struct PaperSettings {
   double perc_process = 0.05;      ///< stop when this share of the points is left
   double distance_m = 0.05;        ///< RANSAC inlier threshold
   std::uint32_t min_points = 200;  ///< smallest plane [points]
-  std::uint32_t outlier_k = 5;     ///< a point with fewer neighbours than this within outlier_radius_m is isolated
+  std::uint32_t outlier_k =
+      5;  ///< a point with fewer neighbours than this within outlier_radius_m is isolated
   double outlier_radius_m = 0.2;
-  std::uint32_t clusters = 1;      ///< K of K-means on colour
-  double alpha_m = 0.15;           ///< radius of the alpha shape; smaller: more detail
-  double rel_area = 1;             ///< least points per square metre of a kept triangle
-  double outside_density = 0.2;    ///< a triangle outside the outline needs this share of the density at its cluster's
-                                   ///< median point, too (the paper: 0)
-  double reduction_m = 0.02;       ///< contour reduction: largest distance of a left-out vertex to the outline
+  std::uint32_t clusters = 1;    ///< K of K-means on colour
+  double alpha_m = 0.15;         ///< radius of the alpha shape; smaller: more detail
+  double rel_area = 1;           ///< least points per square metre of a kept triangle
+  double outside_density = 0.2;  ///< a triangle outside the outline needs this share of the density at its
+                                 ///< cluster's median point, too (the paper: 0)
+  double reduction_m = 0.02;  ///< contour reduction: largest distance of a left-out vertex to the outline
   double leftover_step_m = 0.002;  ///< voxel side of the remaining points (entropy-coded form)
   bool raw = false;                ///< store as the paper did (floats), to compare its own ratio
 };
@@ -58,25 +59,28 @@ struct TileErrors {
 
 struct EncodedTile {
   CodecId codec = CodecId::points;
-  Bytes bytes;                        ///< payload, FORMAT.md 3
-  std::uint64_t points = 0;           ///< points the decoder will give
-  std::uint64_t input_points = 0;     ///< points that went in
-  std::uint64_t geometry_bytes = 0;   ///< of `bytes`, what is not channels
-  Box bounds;                         ///< of the decoded points and the original ones
+  Bytes bytes;                       ///< payload, FORMAT.md 3
+  std::uint64_t points = 0;          ///< points the decoder will give
+  std::uint64_t input_points = 0;    ///< points that went in
+  std::uint64_t geometry_bytes = 0;  ///< of `bytes`, what is not channels
+  Box bounds;                        ///< of the decoded points and the original ones
   TileErrors errors;
 };
 
 /// Encodes the points of one tile. Pure: same input, same bytes, on any thread.
-/// @param tile      points [m, map frame], channels as in schema.channels (all, dropped ones too, same order).
+/// @param tile      points [m, map frame], channels as in schema.channels (all, dropped ones too, same
+/// order).
 /// @param schema    schema.step_m and schema.channels say what is kept.
-/// Errors: InvalidArgument (non-finite points in a lossy codec, a lattice finer than 2^21 cells a side, empty tile).
+/// Errors: InvalidArgument (non-finite points in a lossy codec, a lattice finer than 2^21 cells a side, empty
+/// tile).
 [[nodiscard]] Result<EncodedTile> encode_tile(const PointCloud& tile, const MapSchema& schema,
                                               const TileSettings& settings);
 
 /// Decodes one tile payload, which may be hostile.
 /// @return points laid out as schema.layout().
 /// Errors: Truncated, Malformed, LimitExceeded, UnknownCodec (with byte offset). Threads: pure.
-[[nodiscard]] Result<PointCloud> decode_tile(ByteSpan bytes, const MapSchema& schema, const DecodeLimits& limits = {});
+[[nodiscard]] Result<PointCloud> decode_tile(ByteSpan bytes, const MapSchema& schema,
+                                             const DecodeLimits& limits = {});
 
 /// What the first bytes of a payload say, without decoding it.
 struct TileHeader {

@@ -11,12 +11,15 @@ using Rgb = std::array<double, 3>;
 
 Rgb color_at(const Channel& c, std::size_t i) {
   if (c.info.scalar == ScalarType::u16) {
-    return {c.get<std::uint16_t>(i, 0) / 257.0, c.get<std::uint16_t>(i, 1) / 257.0, c.get<std::uint16_t>(i, 2) / 257.0};
+    return {c.get<std::uint16_t>(i, 0) / 257.0, c.get<std::uint16_t>(i, 1) / 257.0,
+            c.get<std::uint16_t>(i, 2) / 257.0};
   }
   return {double(c.at(i)[0]), double(c.at(i)[1]), double(c.at(i)[2])};
 }
 
-double distance(const Rgb& a, const Rgb& b) { return std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]); }
+double distance(const Rgb& a, const Rgb& b) {
+  return std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
+}
 
 /// Calls f(begin, end) for each run of points that share a voxel.
 template <class F>
@@ -54,8 +57,8 @@ double squared_distance(const Vec3& a, const Vec3& b) {
   return s;
 }
 
-/// Mean distance of `color` to those of points [begin, end): of at most about 64 of them, evenly spread, since a voxel
-/// may hold a whole tile.
+/// Mean distance of `color` to those of points [begin, end): of at most about 64 of them, evenly spread,
+/// since a voxel may hold a whole tile.
 double mean_distance(const Rgb& color, const Channel& decoded, std::size_t begin, std::size_t end) {
   const std::size_t stride = (end - begin + 63) / 64;
   double sum = 0;
@@ -64,9 +67,9 @@ double mean_distance(const Rgb& color, const Channel& decoded, std::size_t begin
   return sum / static_cast<double>(count);
 }
 
-/// Mean of the two directions, each the mean RGB distance to the nearest neighbour: of an original the points at its
-/// voxel's centre (any of them is nearest, so the mean over them), of a decoded point the original of its voxel that
-/// is nearest to the centre.
+/// Mean of the two directions, each the mean RGB distance to the nearest neighbour: of an original the points
+/// at its voxel's centre (any of them is nearest, so the mean over them), of a decoded point the original of
+/// its voxel that is nearest to the centre.
 double measured_error(const ColorContext& tile, const Channel& values, const Channel& decoded) {
   double forth = 0, back = 0;
   for_each_voxel(tile.voxels, [&](std::size_t begin, std::size_t end) {
@@ -80,7 +83,8 @@ double measured_error(const ColorContext& tile, const Channel& values, const Cha
       }
       forth += mean_distance(color_at(values, i), decoded, begin, end);
     }
-    for (std::size_t i = begin; i < end; ++i) back += distance(color_at(values, nearest), color_at(decoded, i));
+    for (std::size_t i = begin; i < end; ++i)
+      back += distance(color_at(values, nearest), color_at(decoded, i));
   });
   return (forth + back) / (2.0 * static_cast<double>(tile.voxels.size()));
 }
@@ -93,8 +97,8 @@ double least_color_error(const Channel& values, const ColorContext& context) {
 
 Result<ChannelEncoding> encode_tile_color(const ChannelSchema& channel, const Channel& values,
                                           const ColorContext& context, Effort effort) {
-  // Points at one position cannot be told apart by their neighbours' distance: different colours there would cost bits and
-  // raise the measured error.
+  // Points at one position cannot be told apart by their neighbours' distance: different colours there would
+  // cost bits and raise the measured error.
   const Channel merged = merge_voxels(values, context.voxels);
   const double floor = measured_error(context, values, merged) / channel.bound;
   ChannelSchema target = channel;

@@ -17,13 +17,14 @@ struct ColorContext {
   std::span<const Vec3> decoded;
 };
 
-/// The error, measured as below, that is left when all points of a voxel get their mean colour and nothing else is lost: no
-/// coding of colours on these positions can do better.
+/// The error, measured as below, that is left when all points of a voxel get their mean colour and nothing
+/// else is lost: no coding of colours on these positions can do better.
 [[nodiscard]] double least_color_error(const Channel& values, const ColorContext& context);
 
-/// Codes colour so that its error *as measured by nearest neighbours* (the evaluation's definition, PAPER.md) stays
-/// within channel.bound. Points that share a decoded position cannot be told apart by that measure, so they are given
-/// their common mean; the target is tightened until the measure is met, if it can be (see least_color_error).
+/// Codes colour so that its error *as measured by nearest neighbours* (the evaluation's definition, PAPER.md)
+/// stays within channel.bound. Points that share a decoded position cannot be told apart by that measure, so
+/// they are given their common mean; the target is tightened until the measure is met, if it can be (see
+/// least_color_error).
 /// @return `error` is the measured one.
 [[nodiscard]] Result<ChannelEncoding> encode_tile_color(const ChannelSchema& channel, const Channel& values,
                                                         const ColorContext& context, Effort effort);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Tile payload to points: the header, then the geometry section, then one section per stored channel (FORMAT.md 3).
+// Tile payload to points: the header, then the geometry section, then one section per stored channel
+// (FORMAT.md 3).
 #include "mapcodec/attribute/channel_decoder.hpp"
 #include "mapcodec/base/byte_reader.hpp"
 #include "mapcodec/codec/lossless_decoder.hpp"
@@ -25,9 +26,11 @@ Result<TileHeader> read_header(ByteReader& in, std::uint8_t& flags) {
   h.points = in.varint();
   MAPCODEC_TRY(in.status("tile header"));
   if (h.codec < CodecId::lossless || h.codec > CodecId::paper) {
-    return make_error(ErrorCode::kUnknownCodec, "tile codec " + std::to_string(int(h.codec)) + " is not known here", 0);
+    return make_error(ErrorCode::kUnknownCodec,
+                      "tile codec " + std::to_string(int(h.codec)) + " is not known here", 0);
   }
-  if ((flags & ~kTileFlagOwnStep) != 0) return make_error(ErrorCode::kMalformed, "tile header has unknown flags", 1);
+  if ((flags & ~kTileFlagOwnStep) != 0)
+    return make_error(ErrorCode::kMalformed, "tile header has unknown flags", 1);
   return h;
 }
 
@@ -37,14 +40,16 @@ Result<Sections> read_sections(ByteSpan bytes, const MapSchema& schema, const De
   std::uint8_t flags = 0;
   MAPCODEC_ASSIGN(s.header, read_header(in, flags));
   if (s.header.points > limits.max_points) {
-    return make_error(ErrorCode::kLimitExceeded, "tile announces " + std::to_string(s.header.points) + " points", 2);
+    return make_error(ErrorCode::kLimitExceeded,
+                      "tile announces " + std::to_string(s.header.points) + " points", 2);
   }
   s.step_m = (flags & kTileFlagOwnStep) != 0 ? in.f64() : schema.step_m;
   MAPCODEC_TRY(in.status("tile header"));
   const std::size_t coded = coded_channels(schema, s.header.codec).size();
   // The last section has no length: it is what is left.
   s.geometry = coded == 0 ? in.raw(in.left()) : in.sized();
-  for (std::size_t i = 0; i < coded; ++i) s.channels.push_back(i + 1 == coded ? in.raw(in.left()) : in.sized());
+  for (std::size_t i = 0; i < coded; ++i)
+    s.channels.push_back(i + 1 == coded ? in.raw(in.left()) : in.sized());
   MAPCODEC_TRY(in.status("tile sections"));
   return s;
 }
@@ -60,13 +65,15 @@ Result<Geometry> decode_geometry(const Sections& s, const MapSchema& schema, con
                     decode_lossless(s.geometry, s.header.points, schema.coordinates, schema.origin, limits));
     return Geometry{std::move(d.xyz), std::move(d.voxels)};
   }
-  if (!(s.step_m > 0) || !std::isfinite(s.step_m)) return make_error(ErrorCode::kMalformed, "tile has no voxel size");
+  if (!(s.step_m > 0) || !std::isfinite(s.step_m))
+    return make_error(ErrorCode::kMalformed, "tile has no voxel size");
   const Quantizer lattice{schema.origin, s.step_m, schema.coordinates.kind};
   MAPCODEC_ASSIGN(DecodedPoints d, decode_points(s.geometry, s.header.points, lattice, limits));
   return Geometry{std::move(d.xyz), std::move(d.voxels)};
 }
 
-Result<PointCloud> decode_with_channels(const Sections& s, const MapSchema& schema, const DecodeLimits& limits) {
+Result<PointCloud> decode_with_channels(const Sections& s, const MapSchema& schema,
+                                        const DecodeLimits& limits) {
   MAPCODEC_ASSIGN(Geometry g, decode_geometry(s, schema, limits));
   PointCloud cloud;
   cloud.coordinates = schema.coordinates;
@@ -76,7 +83,8 @@ Result<PointCloud> decode_with_channels(const Sections& s, const MapSchema& sche
   for (const ChannelSchema& c : schema.channels) {
     if (c.kept == ChannelKept::dropped) continue;
     if (c.info.stride() * n > limits.max_bytes) {
-      return make_error(ErrorCode::kLimitExceeded, "channel '" + c.info.name + "' would need too much memory");
+      return make_error(ErrorCode::kLimitExceeded,
+                        "channel '" + c.info.name + "' would need too much memory");
     }
     const ByteSpan section = c.kept == ChannelKept::constant ? ByteSpan{} : s.channels[next++];
     MAPCODEC_ASSIGN(Channel values, decode_channel(section, c, g.voxels, limits));

@@ -32,12 +32,14 @@ Channel gather(const Channel& from, const std::vector<std::uint32_t>& order) {
   return to;
 }
 
-Result<Geometry> encode_points_geometry(const PointCloud& tile, const MapSchema& schema, const TileSettings& settings) {
+Result<Geometry> encode_points_geometry(const PointCloud& tile, const MapSchema& schema,
+                                        const TileSettings& settings) {
   const Quantizer lattice{schema.origin, schema.step_m, schema.coordinates.kind};
-  MAPCODEC_ASSIGN(PointsEncoding e, encode_points(tile.xyz, lattice, {settings.effort, settings.keep_counts}));
+  MAPCODEC_ASSIGN(PointsEncoding e,
+                  encode_points(tile.xyz, lattice, {settings.effort, settings.keep_counts}));
   Geometry g{std::move(e.bytes), std::move(e.order), std::move(e.voxels), std::move(e.decoded), {}};
-  // The nearest lattice point of an original is its own voxel's centre, and no centre is farther from its nearest
-  // original than from its own: so the larger direction is this one, and no search is needed.
+  // The nearest lattice point of an original is its own voxel's centre, and no centre is farther from its
+  // nearest original than from its own: so the larger direction is this one, and no search is needed.
   g.errors.rms_m = std::sqrt(e.sum_squared_error / static_cast<double>(tile.size()));
   g.errors.max_axis_error_m = e.max_axis_error_m;
   g.errors.density_error = density_error(tile.xyz, g.decoded);
@@ -81,9 +83,12 @@ EncodedTile begin_tile(const PointCloud& tile, CodecId codec, std::uint64_t poin
   return r;
 }
 
-bool is_bounded_color(const ChannelSchema& c) { return c.kept == ChannelKept::bounded && c.info.name == "rgb"; }
+bool is_bounded_color(const ChannelSchema& c) {
+  return c.kept == ChannelKept::bounded && c.info.name == "rgb";
+}
 
-Result<EncodedTile> encode_with_channels(const PointCloud& tile, const MapSchema& schema, const TileSettings& settings) {
+Result<EncodedTile> encode_with_channels(const PointCloud& tile, const MapSchema& schema,
+                                         const TileSettings& settings) {
   MAPCODEC_ASSIGN(Geometry g, settings.codec == CodecId::lossless
                                   ? encode_lossless_geometry(tile, schema, settings.effort)
                                   : encode_points_geometry(tile, schema, settings));
@@ -109,7 +114,8 @@ Result<EncodedTile> encode_with_channels(const PointCloud& tile, const MapSchema
 }
 
 #ifdef MAPCODEC_PAPER_ENCODER
-Result<EncodedTile> encode_paper_tile(const PointCloud& tile, const MapSchema& schema, const TileSettings& settings) {
+Result<EncodedTile> encode_paper_tile(const PointCloud& tile, const MapSchema& schema,
+                                      const TileSettings& settings) {
   MAPCODEC_ASSIGN(PaperEncoding e, encode_paper(tile, schema, settings.paper));
   ByteWriter out;
   EncodedTile r = begin_tile(tile, CodecId::paper, e.points, out);
@@ -124,14 +130,16 @@ Result<EncodedTile> encode_paper_tile(const PointCloud& tile, const MapSchema& s
 }
 #else
 Result<EncodedTile> encode_paper_tile(const PointCloud&, const MapSchema&, const TileSettings&) {
-  return make_error(ErrorCode::kUnsupported, "this build has no encoder for the paper's method (MAPCODEC_PAPER_ENCODER)");
+  return make_error(ErrorCode::kUnsupported,
+                    "this build has no encoder for the paper's method (MAPCODEC_PAPER_ENCODER)");
 }
 #endif
 
 Status check_input(const PointCloud& tile, const MapSchema& schema, const TileSettings& settings) {
   if (tile.empty()) return make_error(ErrorCode::kInvalidArgument, "a tile without points");
   if (tile.size() > std::numeric_limits<std::uint32_t>::max()) {
-    return make_error(ErrorCode::kInvalidArgument, "a tile of more than 2^32 points: choose a smaller tile size");
+    return make_error(ErrorCode::kInvalidArgument,
+                      "a tile of more than 2^32 points: choose a smaller tile size");
   }
   if (tile.channels.size() != schema.channels.size()) {
     return make_error(ErrorCode::kInvalidArgument, "the points' channels are not the schema's");
@@ -144,13 +152,18 @@ Status check_input(const PointCloud& tile, const MapSchema& schema, const TileSe
 
 }  // namespace
 
-Result<EncodedTile> encode_tile(const PointCloud& tile, const MapSchema& schema, const TileSettings& settings) {
+Result<EncodedTile> encode_tile(const PointCloud& tile, const MapSchema& schema,
+                                const TileSettings& settings) {
   MAPCODEC_TRY(check_input(tile, schema, settings));
   switch (settings.codec) {
     case CodecId::lossless:
-    case CodecId::points: return encode_with_channels(tile, schema, settings);
-    case CodecId::paper: return encode_paper_tile(tile, schema, settings);
-    default: return make_error(ErrorCode::kUnknownCodec, std::string("no encoder for codec ") + codec_name(settings.codec));
+    case CodecId::points:
+      return encode_with_channels(tile, schema, settings);
+    case CodecId::paper:
+      return encode_paper_tile(tile, schema, settings);
+    default:
+      return make_error(ErrorCode::kUnknownCodec,
+                        std::string("no encoder for codec ") + codec_name(settings.codec));
   }
 }
 

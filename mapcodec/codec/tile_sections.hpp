@@ -6,10 +6,11 @@
 
 namespace mapcodec {
 
-inline constexpr std::uint8_t kTileFlagOwnStep = 1;  ///< a float64 voxel side follows, instead of schema.step_m
+inline constexpr std::uint8_t kTileFlagOwnStep =
+    1;  ///< a float64 voxel side follows, instead of schema.step_m
 
-/// Indices of the channels of `schema` that have a section of their own in a tile of this codec: those kept exactly or
-/// within a bound. A `paper` tile carries its colour inside the geometry section.
+/// Indices of the channels of `schema` that have a section of their own in a tile of this codec: those kept
+/// exactly or within a bound. A `paper` tile carries its colour inside the geometry section.
 [[nodiscard]] inline std::vector<std::size_t> coded_channels(const MapSchema& schema, CodecId codec) {
   std::vector<std::size_t> r;
   if (codec == CodecId::paper) return r;

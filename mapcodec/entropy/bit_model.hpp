@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The adaptive probability of one binary context. Integers only, so that encoder and decoder agree on any
-// machine.
+// machine (FORMAT.md 4.2).
 #pragma once
 
 #include <array>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Integers of any size over adaptive binary contexts: bit length in unary, then the two bits below the
-// leading one in the context of the length, the rest raw (FORMAT.md 4).
+// leading one in the context of the length, the rest raw (FORMAT.md 4.3).
 #pragma once
 
 #include <algorithm>

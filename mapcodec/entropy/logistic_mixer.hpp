@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Several probabilities of one bit become one: a weighted sum in the logistic domain, weights learnt online
-// [Mahoney 2005, PAQ]. Integers only.
+// [Mahoney 2005, PAQ]. Integers only (FORMAT.md 4.5).
 #pragma once
 
 #include <cstddef>

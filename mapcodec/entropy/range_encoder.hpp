@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Binary range coder [Martin 1979; Subbotin 1999]: 64-bit low and range, carries run into the bytes already
-// written, 32 bits leave at a time (FORMAT.md 4).
+// written, 32 bits leave at a time (FORMAT.md 4.1).
 #pragma once
 
 #include "mapcodec/base/bytes.hpp"

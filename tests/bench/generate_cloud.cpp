@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// generate_cloud OUT.pcd POINTS: a made-up building of 6 m rooms, scanned room after room, coloured, with 4 mm noise.
-// Any number of points in constant memory; the same arguments give the same file.
+// generate_cloud OUT.pcd POINTS: a made-up building of 6 m rooms, scanned room after room, coloured, with 4
+// mm noise. Any number of points in constant memory; the same arguments give the same file.
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -18,7 +18,9 @@ constexpr std::uint64_t kPointsPerRoom = 400000;
 class Random {
  public:
   double uniform() { return double(bits() >> 11) * 0x1p-53; }
-  double normal() { return std::sqrt(-2 * std::log(1 - uniform())) * std::cos(6.283185307179586 * uniform()); }
+  double normal() {
+    return std::sqrt(-2 * std::log(1 - uniform())) * std::cos(6.283185307179586 * uniform());
+  }
 
  private:
   std::uint64_t bits() {

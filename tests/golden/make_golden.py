@@ -144,7 +144,7 @@ def make(program, name, folder):
     source, archive = folder / input_name, HERE / f"{name}.mapc"
     source.write_bytes(maker())
     subprocess.run([program, "compress", source, "-o", archive, *flags.split(), "--threads", "1", "--progress", "none",
-                    "--force"], check=True)
+                    "--force"], check=True, stdout=subprocess.DEVNULL)
     return read_tile.digest(archive.read_bytes())
 
 

@@ -31,7 +31,9 @@ int run(Arguments& a) {
 void add_bench(CLI::App& app, Action& action) {
   auto a = std::make_shared<Arguments>();
   CLI::App* verb = app.add_subcommand("bench", "Measurements on a folder of clouds: JSON, tables and plots");
-  verb->add_option("WHAT", a->what, "paper, rate or scaling")->required()->check(CLI::IsMember({"paper", "rate", "scaling"}));
+  verb->add_option("WHAT", a->what, "paper, rate or scaling")
+      ->required()
+      ->check(CLI::IsMember({"paper", "rate", "scaling"}));
   verb->add_option("--data", a->settings.data, "Folder that is searched for clouds")->required();
   verb->add_option("-o,--output", a->settings.report, "Folder for the report")->required();
   verb->add_option("--threads", a->settings.threads, "0: all cores")->check(CLI::Range(0, 1024));

@@ -23,7 +23,8 @@ struct Arguments {
 
 void add_promise(CLI::App& verb, Arguments& a) {
   auto* group = verb.add_option_group("promise", "What is kept; one of these (default --rms 0.01)");
-  group->add_option("--rms", a.rms, "Symmetric RMS of the decoded cloud stays <= R [m]")->check(CLI::PositiveNumber);
+  group->add_option("--rms", a.rms, "Symmetric RMS of the decoded cloud stays <= R [m]")
+      ->check(CLI::PositiveNumber);
   group->add_option("--max-error", a.max_error, "Every point is kept and moves at most E along each axis [m]")
       ->check(CLI::PositiveNumber);
   group->add_flag("--lossless", a.lossless, "Every bit of every channel; the order of points may change");
@@ -39,40 +40,61 @@ void add_promise(CLI::App& verb, Arguments& a) {
 void add_paper_settings(CLI::App& verb, PaperSettings& p) {
   auto* group = verb.add_option_group("paper", "Parameters of --paper");
   group->add_option("--perc-process", p.perc_process, "Stop when this share of the points is left")
-      ->check(CLI::Range(0.0, 1.0))->capture_default_str();
-  group->add_option("--distance", p.distance_m, "RANSAC inlier threshold [m]")->check(CLI::PositiveNumber)->capture_default_str();
-  group->add_option("--min-points", p.min_points, "Smallest plane [points]")->check(CLI::PositiveNumber)->capture_default_str();
-  group->add_option("--outlier-k", p.outlier_k, "Neighbours a point needs within the radius")->capture_default_str();
-  group->add_option("--outlier-radius", p.outlier_radius_m, "Radius of the outlier filter [m]")->check(CLI::PositiveNumber)->capture_default_str();
-  group->add_option("--clusters", p.clusters, "K of K-means on colour")->check(CLI::Range(1, 256))->capture_default_str();
-  group->add_option("--alpha", p.alpha_m, "Radius of the alpha shape [m]")->check(CLI::PositiveNumber)->capture_default_str();
-  group->add_option("--rel-area", p.rel_area, "Least points per square metre of a kept triangle")->capture_default_str();
+      ->check(CLI::Range(0.0, 1.0))
+      ->capture_default_str();
+  group->add_option("--distance", p.distance_m, "RANSAC inlier threshold [m]")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  group->add_option("--min-points", p.min_points, "Smallest plane [points]")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  group->add_option("--outlier-k", p.outlier_k, "Neighbours a point needs within the radius")
+      ->capture_default_str();
+  group->add_option("--outlier-radius", p.outlier_radius_m, "Radius of the outlier filter [m]")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  group->add_option("--clusters", p.clusters, "K of K-means on colour")
+      ->check(CLI::Range(1, 256))
+      ->capture_default_str();
+  group->add_option("--alpha", p.alpha_m, "Radius of the alpha shape [m]")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  group->add_option("--rel-area", p.rel_area, "Least points per square metre of a kept triangle")
+      ->capture_default_str();
 }
 
 void add_coding(CLI::App& verb, Arguments& a) {
   CompressOptions& o = a.options;
   verb.add_option("--color-error", o.color_error, "Mean RGB distance allowed, 0..255; 0 = exact")
-      ->check(CLI::NonNegativeNumber)->capture_default_str();
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
   verb.add_option("--channels", a.channels, "all, none, or names separated by commas")->capture_default_str();
-  verb.add_option("--tile-size", o.tile_size_m, "Side of a tile [m]; default from the density, about 100k points")
+  verb.add_option("--tile-size", o.tile_size_m,
+                  "Side of a tile [m]; default from the density, about 100k points")
       ->check(CLI::PositiveNumber);
   verb.add_option("--effort", a.effort, "Speed against size at the same promise: fast, default, high")
-      ->check(CLI::IsMember({"fast", "default", "high"}))->capture_default_str();
+      ->check(CLI::IsMember({"fast", "default", "high"}))
+      ->capture_default_str();
   verb.add_flag("--keep-order", o.keep_order, "With --lossless: also the order of the points");
   verb.add_flag("--no-counts", a.no_counts, "Points that share a voxel become one");
 }
 
 void add_unit(CLI::App& verb, CompressOptions& o) {
   verb.add_option("--unit", o.unit_m, "Metres per unit of the input, such as 0.01 for 3DTK's centimetres")
-      ->check(CLI::PositiveNumber)->capture_default_str();
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
 }
 
 void add_running(CLI::App& verb, Arguments& a) {
-  verb.add_option("--threads", a.options.threads, "0: all cores")->check(CLI::Range(0, 1024))->capture_default_str();
+  verb.add_option("--threads", a.options.threads, "0: all cores")
+      ->check(CLI::Range(0, 1024))
+      ->capture_default_str();
   verb.add_option("--max-memory", a.max_memory, "Such as 512M or 2G; default half of the machine's");
-  verb.add_option("--temp-folder", a.options.temp_folder, "For points that do not fit; default beside the output");
+  verb.add_option("--temp-folder", a.options.temp_folder,
+                  "For points that do not fit; default beside the output");
   verb.add_option("--progress", a.progress, "auto, bar, plain, json or none, on stderr")
-      ->check(CLI::IsMember({"auto", "bar", "plain", "json", "none"}))->capture_default_str();
+      ->check(CLI::IsMember({"auto", "bar", "plain", "json", "none"}))
+      ->capture_default_str();
   verb.add_flag("--json", a.json, "Summary as JSON on stdout");
   verb.add_flag("--force", a.options.overwrite, "Replace an existing output");
 }
@@ -106,7 +128,8 @@ Status complete(Arguments& a) {
   o.keep_counts = !a.no_counts;
   o.effort = a.effort == "fast" ? Effort::fast : a.effort == "high" ? Effort::high : Effort::standard;
   o.channels = split(a.channels);
-  if (o.keep_order && !a.lossless) return make_error(ErrorCode::kInvalidArgument, "--keep-order needs --lossless");
+  if (o.keep_order && !a.lossless)
+    return make_error(ErrorCode::kInvalidArgument, "--keep-order needs --lossless");
   if (!a.max_memory.empty()) {
     MAPCODEC_ASSIGN(o.max_memory_bytes, parse_size(a.max_memory));
   }
@@ -121,7 +144,9 @@ Json report_json(const MapFile& map, const CompressReport& r) {
   j["threads"] = r.threads;
   j["peak_memory_bytes"] = peak_memory_bytes();
   j["geometry_bytes"] = r.geometry_bytes;
-  j["seconds"] = {{"survey", r.survey_seconds}, {"tiling", r.tiling_seconds}, {"tiles", r.tiles_seconds},
+  j["seconds"] = {{"survey", r.survey_seconds},
+                  {"tiling", r.tiling_seconds},
+                  {"tiles", r.tiles_seconds},
                   {"commit", r.commit_seconds}};
   j["warnings"] = r.warnings;
   return j;
@@ -142,7 +167,8 @@ int run(Arguments& a) {
   }
   print_info(*map);
   fmt::print("{:<12} {:.2f} s, {:.2f} M points/s on {} threads, peak memory {}\n", "time", report->seconds,
-             double(report->points) / report->seconds / 1e6, report->threads, human_bytes(peak_memory_bytes()));
+             double(report->points) / report->seconds / 1e6, report->threads,
+             human_bytes(peak_memory_bytes()));
   return kDone;
 }
 

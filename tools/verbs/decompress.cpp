@@ -25,7 +25,8 @@ Result<Region> region_of(const Arguments& a) {
     MAPCODEC_ASSIGN(const std::vector<double> v, parse_numbers(a.box, 6));
     r.box = Box{{v[0], v[1], v[2]}, {v[3], v[4], v[5]}};
     for (std::size_t d = 0; d < 3; ++d) {
-      if (v[d] > v[d + 3]) return make_error(ErrorCode::kInvalidArgument, "--box has a minimum above its maximum");
+      if (v[d] > v[d + 3])
+        return make_error(ErrorCode::kInvalidArgument, "--box has a minimum above its maximum");
     }
   }
   if (!a.sphere.empty()) {
@@ -48,8 +49,9 @@ Json report_json(const DecompressReport& r) {
 
 int run(const Arguments& a) {
   if (a.as != "points") {
-    return fail(a.map, make_error(ErrorCode::kUnsupported, "--as " + a.as + " needs surface tiles, which this version "
-                                                           "does not have yet"));
+    return fail(a.map, make_error(ErrorCode::kUnsupported, "--as " + a.as +
+                                                               " needs surface tiles, which this version "
+                                                               "does not have yet"));
   }
   const auto region = region_of(a);
   if (!region.ok()) return fail("decompress", region.error());
@@ -80,11 +82,13 @@ void add_decompress(CLI::App& app, Action& action) {
   auto a = std::make_shared<Arguments>();
   CLI::App* verb = app.add_subcommand("decompress", "An archive in; points out");
   verb->add_option("MAP", a->map, "The archive")->required();
-  verb->add_option("-o,--output", a->output, "File to write: .pcd .ply .las .xyz .txt .pts .bin .vtk")->required();
+  verb->add_option("-o,--output", a->output, "File to write: .pcd .ply .las .xyz .txt .pts .bin .vtk")
+      ->required();
   auto* box = verb->add_option("--box", a->box, "Only points in x0,y0,z0,x1,y1,z1 [m]");
   verb->add_option("--sphere", a->sphere, "Only points in x,y,z,r [m]")->excludes(box);
   verb->add_option("--revision", a->revision, "As the map was at revision N");
-  verb->add_option("--as", a->as, "points, planes or mesh")->check(CLI::IsMember({"points", "planes", "mesh"}));
+  verb->add_option("--as", a->as, "points, planes or mesh")
+      ->check(CLI::IsMember({"points", "planes", "mesh"}));
   verb->add_flag("--ascii", a->write.ascii, "Text instead of binary (PCD, PLY, VTK)");
   verb->add_flag("--binary-compressed", a->write.compressed, "PCD: the binary_compressed form");
   verb->add_option("--threads", a->threads, "0: all cores")->check(CLI::Range(0, 1024));

@@ -31,7 +31,8 @@ int run(const Arguments& a) {
   } else {
     print_evaluation(*e);
     fmt::print("{:<12} {}, {:.3f} bits per point, ratio {:.4f}\n", "size", human_bytes(decoded->bytes),
-               8.0 * double(decoded->bytes) / double(e->points_original), double(decoded->bytes) / double(raw));
+               8.0 * double(decoded->bytes) / double(e->points_original),
+               double(decoded->bytes) / double(raw));
   }
   return kDone;
 }

@@ -25,9 +25,13 @@ void request_stop(int signal) {
 }
 
 /// JSON has no NaN or infinity: such a figure does not apply and is null.
-Json number(double v) { return std::isfinite(v) ? Json(v) : Json(nullptr); }
+Json number(double v) {
+  return std::isfinite(v) ? Json(v) : Json(nullptr);
+}
 
-Json vec_json(const Vec3& v) { return Json::array({number(v[0]), number(v[1]), number(v[2])}); }
+Json vec_json(const Vec3& v) {
+  return Json::array({number(v[0]), number(v[1]), number(v[2])});
+}
 
 Json errors_json(const TileErrors& e) {
   return {{"rms_m", e.rms_m},
@@ -48,21 +52,28 @@ Json channels_json(const MapSchema& schema) {
 
 Json codecs_json(const MapSummary& s) {
   Json r = Json::object();
-  for (const auto& [name, t] : s.codecs) r[name] = {{"tiles", t.tiles}, {"points", t.points}, {"bytes", t.bytes}};
+  for (const auto& [name, t] : s.codecs)
+    r[name] = {{"tiles", t.tiles}, {"points", t.points}, {"bytes", t.bytes}};
   return r;
 }
 
 std::string promise_text(const MapSchema& s) {
   switch (s.promise) {
-    case PromiseKind::lossless: return "every bit";
-    case PromiseKind::max_error: return "no point moves more than " + human_length(s.promise_value) + " along an axis";
-    case PromiseKind::rms: return "symmetric RMS at most " + human_length(s.promise_value);
-    case PromiseKind::paper: return "none (the 2014 method)";
+    case PromiseKind::lossless:
+      return "every bit";
+    case PromiseKind::max_error:
+      return "no point moves more than " + human_length(s.promise_value) + " along an axis";
+    case PromiseKind::rms:
+      return "symmetric RMS at most " + human_length(s.promise_value);
+    case PromiseKind::paper:
+      return "none (the 2014 method)";
   }
   return "?";
 }
 
-void row(const char* name, const std::string& value) { fmt::print("{:<12} {}\n", name, value); }
+void row(const char* name, const std::string& value) {
+  fmt::print("{:<12} {}\n", name, value);
+}
 
 std::string duration_text(double seconds) {
   return seconds < 100 ? fmt::format("{:.0f} s", seconds) : fmt::format("{:.0f} min", seconds / 60);
@@ -85,7 +96,8 @@ class ProgressBar {
     const double seconds = std::chrono::duration<double>(now - begin_).count();
     const double share = p.total == 0 ? 0 : std::min(1.0, double(p.done) / double(p.total));
     const double rate = seconds > 0 ? double(p.done) / seconds : 0;
-    const std::string left = share > 0 && share < 1 ? duration_text(seconds * (1 - share) / share) + " left" : "";
+    const std::string left =
+        share > 0 && share < 1 ? duration_text(seconds * (1 - share) / share) + " left" : "";
     const int filled = int(share * 24);
     fmt::print(stderr, "\r{:<9} [{}{}] {:3.0f} %  {}  {:<12}", phase_, std::string(size_t(filled), '#'),
                std::string(size_t(24 - filled), '.'), 100 * share, rate_text(rate), left);
@@ -98,7 +110,8 @@ class ProgressBar {
  private:
   /// Decoding counts tiles, everything else points.
   [[nodiscard]] std::string rate_text(double rate) const {
-    return phase_ == "decode" ? fmt::format("{:6.0f} tiles/s", rate) : fmt::format("{:6.2f} M points/s", rate / 1e6);
+    return phase_ == "decode" ? fmt::format("{:6.0f} tiles/s", rate)
+                              : fmt::format("{:6.2f} M points/s", rate / 1e6);
   }
 
   std::string phase_;
@@ -131,15 +144,22 @@ void print_json_progress(const Progress& p) {
 
 int exit_code(ErrorCode code) {
   switch (code) {
-    case ErrorCode::kInvalidArgument: return kUsage;
-    case ErrorCode::kCannotWrite: return kNoOutput;
+    case ErrorCode::kInvalidArgument:
+      return kUsage;
+    case ErrorCode::kCannotWrite:
+      return kNoOutput;
     case ErrorCode::kArchiveDamaged:
     case ErrorCode::kChecksumMismatch:
-    case ErrorCode::kUnknownCodec: return kDamaged;
-    case ErrorCode::kPromiseBroken: return kDifference;
-    case ErrorCode::kCancelled: return kInterrupted;
-    case ErrorCode::kUnreachable: return kUnreachable;
-    default: return kBadInput;
+    case ErrorCode::kUnknownCodec:
+      return kDamaged;
+    case ErrorCode::kPromiseBroken:
+      return kDifference;
+    case ErrorCode::kCancelled:
+      return kInterrupted;
+    case ErrorCode::kUnreachable:
+      return kUnreachable;
+    default:
+      return kBadInput;
   }
 }
 
@@ -219,7 +239,8 @@ Json tiles_json(const MapFile& map) {
 void print_info(const MapFile& map) {
   const MapSummary s = map.summary();
   const MapSchema& schema = map.schema();
-  row("file", fmt::format("{} ({}, revision {})", map.path(), human_bytes(s.bytes), map.archive().revision()));
+  row("file",
+      fmt::format("{} ({}, revision {})", map.path(), human_bytes(s.bytes), map.archive().revision()));
   row("points", human_count(s.points) + fmt::format(" in {} tiles", s.tiles));
   if (const auto dropped = map.archive().info().dropped_points; dropped > 0) {
     row("dropped", human_count(dropped) + " points without a finite position");
@@ -228,16 +249,20 @@ void print_info(const MapFile& map) {
   row("promise", promise_text(schema));
   row("achieved", fmt::format("RMS {}, largest axis error {}", human_length(s.achieved.rms_m),
                               human_length(s.achieved.max_axis_error_m)));
-  row("", fmt::format("colour error {:.2f}, density error {:.3f}", s.achieved.color_error, s.achieved.density_error));
+  row("", fmt::format("colour error {:.2f}, density error {:.3f}", s.achieved.color_error,
+                      s.achieved.density_error));
   for (std::size_t d = 0; d < 3 && !s.bounds.empty(); ++d) {
-    row(d == 0 ? "bounds" : "", fmt::format("{} {:.3f} .. {:.3f} m", "xyz"[d], s.bounds.min[d], s.bounds.max[d]));
+    row(d == 0 ? "bounds" : "",
+        fmt::format("{} {:.3f} .. {:.3f} m", "xyz"[d], s.bounds.min[d], s.bounds.max[d]));
   }
   for (const ChannelSchema& c : schema.channels) {
-    row("channel", fmt::format("{} ({}): {}{}", c.info.name, c.info.type_name(), kept_name(c.kept),
-                               c.kept == ChannelKept::bounded ? fmt::format(", error at most {}", c.bound) : ""));
+    row("channel",
+        fmt::format("{} ({}): {}{}", c.info.name, c.info.type_name(), kept_name(c.kept),
+                    c.kept == ChannelKept::bounded ? fmt::format(", error at most {}", c.bound) : ""));
   }
   for (const auto& [name, t] : s.codecs) {
-    row("codec", fmt::format("{}: {} tiles, {} points, {}", name, t.tiles, human_count(t.points), human_bytes(t.bytes)));
+    row("codec", fmt::format("{}: {} tiles, {} points, {}", name, t.tiles, human_count(t.points),
+                             human_bytes(t.bytes)));
   }
 }
 
@@ -264,12 +289,15 @@ Json evaluation_json(const Evaluation& e, std::uint64_t bytes, std::uint64_t raw
 }
 
 void print_evaluation(const Evaluation& e) {
-  row("points", fmt::format("{} original, {} decoded", human_count(e.points_original), human_count(e.points_decoded)));
+  row("points",
+      fmt::format("{} original, {} decoded", human_count(e.points_original), human_count(e.points_decoded)));
   row("RMS", fmt::format("{} (to decoded {}, back {})", human_length(e.rms_m), human_length(e.rms_ab_m),
                          human_length(e.rms_ba_m)));
-  row("largest", fmt::format("{}, along one axis {}", human_length(e.max_m), human_length(e.max_axis_error_m)));
+  row("largest",
+      fmt::format("{}, along one axis {}", human_length(e.max_m), human_length(e.max_axis_error_m)));
   row("PSNR", fmt::format("D1 {:.2f} dB, D2 {:.2f} dB", e.d1_psnr_db, e.d2_psnr_db));
-  if (std::isfinite(e.color_error)) row("colour", fmt::format("error {:.2f}, Y {:.2f} dB", e.color_error, e.y_psnr_db));
+  if (std::isfinite(e.color_error))
+    row("colour", fmt::format("error {:.2f}, Y {:.2f} dB", e.color_error, e.y_psnr_db));
   row("density", fmt::format("error {:.4f}", e.density_error));
 }
 
@@ -305,8 +333,8 @@ Result<std::uint64_t> parse_size(const std::string& text) {
   double v = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), v);
   const std::string unit(end, text.data() + text.size());
-  const std::map<std::string, double> units{{"", 1.0},           {"K", 1024.0},          {"M", 1048576.0},
-                                            {"G", 1073741824.0}, {"T", 1099511627776.0}};
+  const std::map<std::string, double> units{
+      {"", 1.0}, {"K", 1024.0}, {"M", 1048576.0}, {"G", 1073741824.0}, {"T", 1099511627776.0}};
   const auto known = units.find(unit);
   if (error != std::errc() || known == units.end() || !(v > 0) || v * known->second > 1e18) {
     return make_error(ErrorCode::kInvalidArgument, "'" + text + "' is not a size such as 512M or 2G");

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What every verb says in the same way: failures, progress, the summary of a map, the summary of an evaluation.
+// What every verb says in the same way: failures, progress, the summary of a map, the summary of an
+// evaluation.
 #pragma once
 
 #include <atomic>
@@ -27,15 +28,16 @@ enum ExitCode {
 };
 [[nodiscard]] int exit_code(ErrorCode code);
 
-/// Prints `mapcodec: FILE: what is wrong (where)` on stderr, FILE left out where the message already names it.
+/// Prints `mapcodec: FILE: what is wrong (where)` on stderr, FILE left out where the message already names
+/// it.
 /// @return the exit code for the error.
 int fail(const std::string& file, const Error& error);
 
 /// Becomes true on SIGINT or SIGTERM (installed on first use); work then stops and cleans up.
 [[nodiscard]] const std::atomic<bool>* stop_flag();
 
-/// Draws progress on stderr in one of the styles of --progress (auto, bar, plain, json, none); auto draws a bar on a
-/// terminal and nothing elsewhere.
+/// Draws progress on stderr in one of the styles of --progress (auto, bar, plain, json, none); auto draws a
+/// bar on a terminal and nothing elsewhere.
 [[nodiscard]] ProgressCallback progress_printer(const std::string& style);
 
 [[nodiscard]] Json info_json(const MapFile& map);

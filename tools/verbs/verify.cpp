@@ -35,7 +35,8 @@ int run(const Arguments& a) {
   settings.arena = &arena;
   settings.progress = progress_printer(a.progress);
   settings.stop = stop_flag();
-  const auto v = a.originals.empty() ? verify_map(a.map, settings) : verify_map_against(a.map, a.originals, settings);
+  const auto v =
+      a.originals.empty() ? verify_map(a.map, settings) : verify_map_against(a.map, a.originals, settings);
   settings.progress = {};
   if (!v.ok()) return fail(a.map, v.error());
   if (a.json) fmt::print("{}\n", outcome_json(*v).dump(2));
@@ -52,7 +53,8 @@ int run(const Arguments& a) {
 
 void add_verify(CLI::App& app, Action& action) {
   auto a = std::make_shared<Arguments>();
-  CLI::App* verb = app.add_subcommand("verify", "Checksums and structure; with an original: the promise, measured");
+  CLI::App* verb =
+      app.add_subcommand("verify", "Checksums and structure; with an original: the promise, measured");
   verb->add_option("MAP", a->map, "The archive")->required();
   verb->add_option("--against", a->originals, "The original file or files")->expected(1, -1);
   verb->add_flag("--json", a->json, "As JSON");
