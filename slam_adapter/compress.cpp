@@ -149,7 +149,7 @@ class Job {
   Status encode_until_kept() {
     MAPCODEC_TRY(find_target(1));
     MAPCODEC_TRY(refine_for_color());
-    constexpr int kTries = 5;
+    constexpr int kTries = 8;
     for (int i = 0;; ++i) {
       auto at = Clock::now();
       MAPCODEC_TRY(encode_once());
@@ -177,7 +177,9 @@ class Job {
     const auto color = bounded_color();
     if (color && schema_.step_m > 0 && total.color_error > schema_.channels[*color].bound &&
         schema_.coordinates.kind != CoordinateFormat::Kind::fixed) {
-      schema_.step_m *= std::clamp(schema_.channels[*color].bound / total.color_error, 0.6, 0.95);
+      // Some tiles can do no better than their voxels allow: the others have to be better, and the voxels smaller.
+      color_target_ *= std::min(0.97, schema_.channels[*color].bound / total.color_error);
+      schema_.step_m *= ++color_tries_ < 3 ? 0.85 : 0.6;
       return false;
     }
     return true;
@@ -261,7 +263,9 @@ class Job {
     pipeline.progress = options_.progress;
     pipeline.stop = options_.stop;
     pipeline.tile_seconds = &report_.tile_seconds;
-    return encode_tiles(*tiles_, schema_, tile_settings(options_), pipeline,
+    MapSchema target = schema_;
+    if (const auto color = bounded_color()) target.channels[*color].bound *= color_target_;
+    return encode_tiles(*tiles_, target, tile_settings(options_), pipeline,
                         [this](const TileKey& key, EncodedTile&& t) { return store(key, std::move(t)); });
   }
 
@@ -310,6 +314,8 @@ class Job {
   double correction_ = 1;     // of the target size
   double position_step_ = 0;  // what the positions' promise alone would allow
   int target_tries_ = 0;
+  double color_target_ = 1;  // share of the colour bound that tiles aim at
+  int color_tries_ = 0;
   CompressReport report_;
 };
 

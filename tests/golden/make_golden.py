@@ -98,7 +98,8 @@ def odd_scan():
             p = [0.0, -0.0, p[2] * 1e-20]
         elif k % 11 == 0:
             p = list(rows[-1][:3])
-        rows.append((*p, packed(c), i, k % 16, r.choice((1, 2, 2, 2, 6)), r.randrange(-100, 100), -k * k, 1.6e9 + k / 8192))
+        label, tilt = r.choice((1, 2, 2, 2, 6)), r.randrange(-100, 100)
+        rows.append((*p, packed(c), i, k % 16, label, tilt, -k * k, 1.6e9 + k / 8192))
     fields = COLORED + (("ring", "H"), ("label", "B"), ("tilt", "b"), ("range", "i"), ("time", "d"))
     return pcd(fields, rows)
 
@@ -107,8 +108,30 @@ def utm_decimals():
     """Doubles that were millimetres in a text, some of which are not."""
     rows = []
     for k, (p, _, _) in enumerate(room(random.Random(6), 600, offset=(-456789, 5428123, 312))):
-        rows.append([v if k % 50 == 0 else round(v, 3) for v in p])
+        rows.append([v if k % 150 == 0 else round(v, 3) for v in p])
     return pcd(XYZ_DOUBLE, rows)
+
+
+def text_scan():
+    """Float32 numbers that were decimals in a text, and scalars on lattices of several kinds, with a few exceptions."""
+    r, rows = random.Random(8), []
+    for k, (p, _, i) in enumerate(room(r, 500, offset=(-2, 1, 0))):
+        place = [-0.0, -0.0, 1e-30] if k % 125 == 60 else [round(v, 2) for v in p]
+        time = NAN if k % 90 == 45 else round(1000 + k * 0.125 + r.randrange(9) * 0.001, 3)
+        product = struct.unpack("f", struct.pack("f", int(i * 40)))[0] * struct.unpack("f", struct.pack("f", 0.01))[0]
+        rows.append((*place, r.choice((3, 900, 70000, 4100000)), time, product))
+    return pcd(XYZ + (("kind", "I"), ("time", "d"), ("range", "f")), rows)
+
+
+def crowded_colors():
+    """Points that share a voxel, each of its own colour."""
+    r = random.Random(9)
+    return pcd(COLORED[:4], [(*p, packed([v + r.randrange(60) for v in c])) for p, c, _ in room(r, 1500, noise=0.001)])
+
+
+def pile():
+    """A voxel with more points than twelve bits count."""
+    return pcd(XYZ, [(1, 1, 1)] * 9000 + [(k, 1, k % 3) for k in range(20)] + [(2, 2, 2)] * 5000)
 
 
 def survey():
@@ -129,10 +152,14 @@ CLOUDS = {
     "points_no_counts": ("a.pcd", crowded_room, "--rms 0.02 --no-counts"),
     "points_dust": ("a.pcd", dust, "--max-error 0.0005"),
     "points_one": ("a.pcd", lambda: pcd(COLORED, [(1, 2, 3, 0x102030, 0.5)]), "--max-error 0.01"),
+    "points_crowded_colors": ("a.pcd", crowded_colors, "--max-error 0.05 --color-error 2"),
+    "points_crowded_exact": ("a.pcd", crowded_colors, "--max-error 0.05 --color-error 0"),
+    "points_pile": ("a.pcd", pile, "--max-error 0.05"),
     "points_utm": ("a.pcd", utm_room, "--max-error 0.001"),
     "points_survey": ("a.las", survey, "--rms 0.005"),
     "lossless_odd": ("a.pcd", odd_scan, "--lossless"),
     "lossless_odd_order": ("a.pcd", odd_scan, "--lossless --keep-order --effort high"),
+    "lossless_text": ("a.pcd", text_scan, "--lossless"),
     "lossless_utm": ("a.pcd", utm_decimals, "--lossless"),
     "lossless_utm_floats": ("a.pcd", utm_room, "--lossless --effort fast"),
     "lossless_survey": ("a.las", survey, "--lossless"),
