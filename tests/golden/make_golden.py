@@ -184,9 +184,9 @@ def main():
     hashes = json.loads(listing.read_text()) if listing.exists() else {}
     with tempfile.TemporaryDirectory() as folder:
         for name in CLOUDS:
-            if options.replace or not (HERE / f"{name}.mapc").exists():
+            if options.replace or name not in hashes:
                 hashes[name] = make(options.program, name, pathlib.Path(folder))
-    listing.write_text(json.dumps(hashes, indent=1, sort_keys=True) + "\n")
+                listing.write_text(json.dumps(hashes, indent=1, sort_keys=True) + "\n")
 
 
 if __name__ == "__main__":
