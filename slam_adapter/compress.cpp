@@ -160,6 +160,7 @@ class Job {
         return make_error(ErrorCode::kPromiseBroken, "no voxel size was found that keeps the promise");
     }
     say_if_finer_for_color();
+    say_if_color_misses();
     auto at = Clock::now();
     MAPCODEC_TRY(commit());
     report_.commit_seconds = lap(at);
@@ -210,6 +211,14 @@ class Job {
     report_.warnings.push_back(
         "voxels are " + millimetres(schema_.step_m) + " instead of " + millimetres(position_step_) +
         ", so that colours keep their bound (a larger --color-error makes the map smaller)");
+  }
+
+  /// On a source's own lattice voxels are not made finer for colour.
+  void say_if_color_misses() {
+    const auto color = bounded_color();
+    if (!color || !(errors_.total().color_error > schema_.channels[*color].bound)) return;
+    report_.warnings.push_back("the colour error is " + std::to_string(errors_.total().color_error) +
+                               ", above the bound: points of different colours share a position");
   }
 
   static std::string millimetres(double m) {

@@ -157,7 +157,10 @@ int run(Arguments& a) {
   a.options.progress = progress_printer(a.progress);
   const auto report = compress_files(a.inputs, a.output, a.options);
   a.options.progress = {};
-  if (!report.ok()) return fail(a.inputs.front(), report.error());
+  if (!report.ok()) {
+    const bool output = report.error().code == ErrorCode::kCannotWrite;
+    return fail(output ? a.output : a.inputs.front(), report.error());
+  }
   for (const std::string& warning : report->warnings) spdlog::warn("note: {}", warning);
   const auto map = MapFile::open(a.output);
   if (!map.ok()) return fail(a.output, map.error());
