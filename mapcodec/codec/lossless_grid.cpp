@@ -5,7 +5,9 @@ namespace mapcodec {
 namespace {
 
 /// 2^e as a double, -1022 <= e <= 1023.
-double power_of_two(int e) { return std::bit_cast<double>(static_cast<std::uint64_t>(e + 1023) << 52); }
+double power_of_two(int e) {
+  return std::bit_cast<double>(static_cast<std::uint64_t>(e + 1023) << 52);
+}
 
 }  // namespace
 

@@ -45,17 +45,13 @@ class PlaneExtractor {
   /// Moves the plane's points out of `remaining_`; none, and no change, if they are fewer than the smallest
   /// plane.
   Indices take_inliers(const Plane& plane) {
-    const auto far = [&](std::uint32_t i) {
-      return !(std::abs(plane.distance(xyz_[i])) <= settings_.distance_m);
-    };
-    Indices inliers;
+    Indices inliers, others;
     for (const std::uint32_t i : remaining_) {
-      if (!far(i)) inliers.push_back(i);
+      const bool near = std::abs(plane.distance(xyz_[i])) <= settings_.distance_m;
+      (near ? inliers : others).push_back(i);
     }
     if (inliers.size() < std::max<std::size_t>(settings_.min_points, 3)) return {};
-    remaining_.erase(
-        std::remove_if(remaining_.begin(), remaining_.end(), [&](std::uint32_t i) { return !far(i); }),
-        remaining_.end());
+    remaining_.swap(others);
     return inliers;
   }
 
@@ -80,21 +76,35 @@ class PlaneExtractor {
     return r;
   }
 
+  /// The raw form shares a plane's points by area alone, so each cluster ("coloured plane") is a plane of its
+  /// own there: else the triangles of a sparse colour would take the points of a dense one below them. The
+  /// coded form keeps a density per triangle, and its clusters are one plane.
   Status add_plane(const Plane& plane, const Indices& points) {
     const PlaneFrame frame(plane, step_m_);
     LatticePlane lattice;
-    lattice.axis = frame.axis();
-    std::vector<bool> covered;
     for (const Indices& cluster : split_by_color(points)) {
-      MAPCODEC_TRY(mesh_cluster(xyz_, colors_, cluster, frame, settings_, lattice, covered));
-      for (std::size_t i = 0; i < cluster.size(); ++i) {
-        if (!covered[i]) result_.leftovers.push_back(cluster[i]);
-      }
+      MAPCODEC_TRY(add_cluster(frame, cluster, lattice));
+      if (settings_.raw) keep(frame, lattice);
     }
-    if (lattice.triangles.empty()) return {};
-    place(frame, lattice);
-    result_.planes.push_back(std::move(lattice));
+    keep(frame, lattice);
     return {};
+  }
+  Status add_cluster(const PlaneFrame& frame, const Indices& cluster, LatticePlane& plane) {
+    std::vector<bool> covered;
+    MAPCODEC_TRY(mesh_cluster(xyz_, colors_, cluster, frame, settings_, plane, covered));
+    for (std::size_t i = 0; i < cluster.size(); ++i) {
+      if (!covered[i]) result_.leftovers.push_back(cluster[i]);
+    }
+    return {};
+  }
+  /// Moves the plane, if it has triangles, into the result; `plane` is empty then.
+  void keep(const PlaneFrame& frame, LatticePlane& plane) {
+    if (!plane.triangles.empty()) {
+      plane.axis = frame.axis();
+      place(frame, plane);
+      result_.planes.push_back(std::move(plane));
+    }
+    plane = LatticePlane{};
   }
 
   /// Bounding box and heights of a plane whose triangles are there.

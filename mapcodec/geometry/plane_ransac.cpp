@@ -6,6 +6,8 @@
 #include <pcl/sample_consensus/ransac.h>
 #include <pcl/sample_consensus/sac_model_plane.h>
 #include <Eigen/Eigenvalues>
+#include <array>
+#include <cmath>
 #include <mutex>
 
 namespace mapcodec {
@@ -54,6 +56,34 @@ pcl::PointCloud<pcl::PointXYZ>::Ptr take_evenly(std::span<const Vec3> xyz,
   return cloud;
 }
 
+/// PCL's plane model with the same count from coordinates that lie side by side: the compiler does four
+/// points at once, where PCL goes through an index and a padded point for each.
+class PlaneModel : public pcl::SampleConsensusModelPlane<pcl::PointXYZ> {
+ public:
+  explicit PlaneModel(const pcl::PointCloud<pcl::PointXYZ>::ConstPtr& cloud)
+      : SampleConsensusModelPlane(cloud, false) {
+    for (std::vector<float>& axis : axes_) axis.reserve(cloud->size());
+    for (const pcl::PointXYZ& p : *cloud) {
+      axes_[0].push_back(p.x);
+      axes_[1].push_back(p.y);
+      axes_[2].push_back(p.z);
+    }
+  }
+  std::size_t countWithinDistance(const Eigen::VectorXf& plane, const double threshold) const override {
+    if (!isModelValid(plane)) return 0;
+    const float a = plane[0], b = plane[1], c = plane[2], d = plane[3];
+    const auto limit = static_cast<float>(threshold);
+    const float *x = axes_[0].data(), *y = axes_[1].data(), *z = axes_[2].data();
+    const std::size_t size = axes_[0].size();
+    std::uint32_t near = 0;
+    for (std::size_t i = 0; i < size; ++i) near += std::abs(a * x[i] + b * y[i] + c * z[i] + d) < limit;
+    return near;
+  }
+
+ private:
+  std::array<std::vector<float>, 3> axes_;
+};
+
 /// PCL prints what it cannot fit; a library must not.
 void silence_pcl() {
   static std::once_flag once;
@@ -63,8 +93,7 @@ void silence_pcl() {
 std::optional<Plane> search(std::span<const Vec3> xyz, std::span<const std::uint32_t> remaining,
                             double distance_m) {
   silence_pcl();
-  auto model =
-      pcl::make_shared<pcl::SampleConsensusModelPlane<pcl::PointXYZ>>(take_evenly(xyz, remaining), false);
+  const auto model = pcl::make_shared<PlaneModel>(take_evenly(xyz, remaining));
   pcl::RandomSampleConsensus<pcl::PointXYZ> ransac(model, distance_m);
   ransac.setMaxIterations(kMaxIterations);
   ransac.setProbability(0.99);

@@ -21,7 +21,7 @@ struct Plane {
   }
 };
 
-/// Finds the plane that most of `remaining` are near to: RANSAC (probability 0.99) scored on at most 20,000
+/// Finds the plane that most of `remaining` are near to: RANSAC (probability 0.99) scored on at most 2000
 /// evenly taken points, then a least-squares plane through all its inliers. Deterministic.
 /// @param xyz        [m], relative to a corner nearby: PCL works in float32.
 /// @param remaining  indices into xyz that take part.

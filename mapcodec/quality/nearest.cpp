@@ -82,9 +82,11 @@ double axis_distance(const Vec3& a, const Vec3& b) {
 }
 
 /// The maximum-norm distance to the nearest point in that norm, which is at most `bound`.
-double nearest_axis_distance(const Vec3& p, std::span<const Vec3> to, const NeighborIndex& index, double bound) {
+double nearest_axis_distance(const Vec3& p, std::span<const Vec3> to, const NeighborIndex& index,
+                             double bound) {
   double best = bound;
-  for (const std::uint32_t id : index.within(p, bound * 1.7320509)) best = std::min(best, axis_distance(p, to[id]));
+  for (const std::uint32_t id : index.within(p, bound * 1.7320509))
+    best = std::min(best, axis_distance(p, to[id]));
   return best;
 }
 
@@ -92,7 +94,8 @@ double nearest_axis_distance(const Vec3& p, std::span<const Vec3> to, const Neig
 
 double max_axis_error(std::span<const Vec3> from, std::span<const Vec3> to, const NeighborIndex& index,
                       const Nearest& nearest) {
-  // Upper bounds, the largest first: few of them have to be refined before none that is left can be the maximum.
+  // Upper bounds, the largest first: few of them have to be refined before none that is left can be the
+  // maximum.
   std::vector<std::pair<double, std::uint32_t>> bounds(from.size());
   for (std::size_t i = 0; i < from.size(); ++i) {
     bounds[i] = {axis_distance(from[i], to[nearest.index[i]]), static_cast<std::uint32_t>(i)};

@@ -46,10 +46,10 @@ struct DistanceStats {
 };
 [[nodiscard]] DistanceStats summarise(std::span<const Vec3> from, const Nearest& nearest);
 
-/// The largest distance in the maximum norm [m] of a point of `from` to its nearest in that norm: what a bound on the error
-/// along each axis promises. The Euclidean neighbours in `nearest` only narrow the search, since of two neighbours the
-/// nearer one can be farther along one axis.
-[[nodiscard]] double max_axis_error(std::span<const Vec3> from, std::span<const Vec3> to, const NeighborIndex& index,
-                                    const Nearest& nearest);
+/// The largest distance in the maximum norm [m] of a point of `from` to its nearest in that norm: what a
+/// bound on the error along each axis promises. The Euclidean neighbours in `nearest` only narrow the search,
+/// since of two neighbours the nearer one can be farther along one axis.
+[[nodiscard]] double max_axis_error(std::span<const Vec3> from, std::span<const Vec3> to,
+                                    const NeighborIndex& index, const Nearest& nearest);
 
 }  // namespace mapcodec

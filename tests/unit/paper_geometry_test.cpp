@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <set>
 
+#include "mapcodec/codec/paper_region.hpp"
 #include "mapcodec/geometry/alpha_shape.hpp"
 #include "mapcodec/geometry/kmeans.hpp"
 #include "mapcodec/geometry/outlier_filter.hpp"
@@ -28,6 +30,31 @@ double signed_area(const std::vector<Point2>& points, const Contour& contour) {
     sum += a[0] * b[1] - a[1] * b[0];
   }
   return sum / 2;
+}
+
+TEST(PaperRegion, OpenEdgesEqualASet) {
+  paper::OpenEdges edges;
+  SplitMix random(1);
+  for (std::uint32_t round = 0; round < 3; ++round) {
+    const std::uint32_t first = 7 * round;
+    edges.clear(first);
+    std::set<std::pair<std::uint32_t, std::uint32_t>> expected;
+    for (int i = 0; i < 20000; ++i) {
+      // Few first vertices, so that more edges leave each than fit in place.
+      const auto a = first + static_cast<std::uint32_t>(random.next() % 3);
+      const auto b = first + static_cast<std::uint32_t>(random.next() % 20);
+      ASSERT_EQ(edges.contains(a, b), expected.contains({a, b}));
+      if (random.next() % 2 == 0) {
+        ASSERT_EQ(edges.erase(a, b), expected.erase({a, b}) != 0);
+      } else if (expected.insert({a, b}).second) {
+        edges.insert(a, b);
+      }
+      const auto after = expected.upper_bound({a, paper::kNoVertex});
+      const bool none = after == expected.begin() || std::prev(after)->first != a;
+      ASSERT_EQ(edges.last(a), none ? paper::kNoVertex : std::prev(after)->second);
+    }
+  }
+  EXPECT_EQ(edges.last(1000), paper::kNoVertex);
 }
 
 TEST(PaperSampler, ApportionsExactly) {
