@@ -153,7 +153,7 @@ class Job {
     for (int i = 0;; ++i) {
       auto at = Clock::now();
       MAPCODEC_TRY(encode_once());
-      report_.tiles_seconds = lap(at);
+      report_.tiles_seconds += lap(at);
       MAPCODEC_ASSIGN(const bool kept, is_kept_or_adjust());
       if (kept) break;
       if (i + 1 == kTries)
@@ -178,9 +178,10 @@ class Job {
     const auto color = bounded_color();
     if (color && schema_.step_m > 0 && total.color_error > schema_.channels[*color].bound &&
         schema_.coordinates.kind != CoordinateFormat::Kind::fixed) {
-      // Some tiles can do no better than their voxels allow: the others have to be better, and the voxels smaller.
-      color_target_ *= std::min(0.97, schema_.channels[*color].bound / total.color_error);
-      schema_.step_m *= ++color_tries_ < 3 ? 0.85 : 0.6;
+      // Some tiles can do no better than their voxels allow: the others have to be better, and if that is not
+      // enough, the voxels smaller.
+      color_target_ *= std::min(0.98, schema_.channels[*color].bound / total.color_error);
+      if (++color_tries_ > 1) schema_.step_m *= color_tries_ < 4 ? 0.85 : 0.6;
       return false;
     }
     return true;

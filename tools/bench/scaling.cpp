@@ -17,6 +17,8 @@
 namespace mapcodec {
 namespace {
 
+constexpr double kScalingBound = 0.005;  // [m]
+
 using bench::digits;
 using bench::Json;
 using bench::TaskGraph;
@@ -53,6 +55,8 @@ Status time_encoding(const PointCloud& cloud, const std::string& path, Timing& t
   CompressOptions o;
   o.threads = t.threads;
   o.overwrite = true;
+  o.promise = PromiseKind::max_error;  // one coding pass, whatever the colours
+  o.promise_m = kScalingBound;
   CloudSource source(cloud);
   const Watch processor(Watch::Kind::whole_process);
   MAPCODEC_ASSIGN(CompressReport r, compress(source, path, o));
