@@ -37,7 +37,7 @@ struct PaperSettings {
   double rel_area = 1;           ///< least points per square metre of a kept triangle
   double outside_density = 0.2;  ///< a triangle outside the outline needs this share of the density at its
                                  ///< cluster's median point, too (the paper: 0)
-  double reduction_m = 0.02;  ///< contour reduction: largest distance of a left-out vertex to the outline
+  double reduction_m = 0.02;     ///< contour reduction: largest distance of a left-out vertex to the outline
   double leftover_step_m = 0.002;  ///< voxel side of the remaining points (entropy-coded form)
   bool raw = false;                ///< store as the paper did (floats), to compare its own ratio
 };
