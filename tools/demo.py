@@ -60,7 +60,7 @@ class Demo:
     def row(self, label, made, got, measured):
         colour = measured["color_error"]
         print(f"{label:<20}{made['bytes']:>11,}{made['ratio']:>8.4f}{made['bits_per_point']:>8.3f}"
-              f"{1e3 * measured['rms_m']:>8.3f}{1e3 * made['achieved']['max_axis_error_m']:>8.3f}"
+              f"{1e3 * measured['rms_m']:>8.3f}{1e3 * measured['max_axis_error_m']:>8.3f}"
               f"{'-' if colour is None or not self.coloured(made) else format(colour, '.2f'):>7}"
               f"{made['encode_seconds']:>5.1f}{got['decode_seconds']:>5.2f}", flush=True)
 

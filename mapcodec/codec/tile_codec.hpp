@@ -35,7 +35,7 @@ struct PaperSettings {
   std::uint32_t clusters = 1;    ///< K of K-means on colour
   double alpha_m = 0.15;         ///< radius of the alpha shape; smaller: more detail
   double rel_area = 1;           ///< least points per square metre of a kept triangle
-  double outside_density = 0.2;  ///< a triangle outside the outline needs this share of the density at its
+  double outside_density = 0;  ///< a triangle outside the outline needs this share of the density at its
                                  ///< cluster's median point, too (the paper: 0)
   double reduction_m = 0.02;     ///< contour reduction: largest distance of a left-out vertex to the outline
   double leftover_step_m = 0.002;  ///< voxel side of the remaining points (entropy-coded form)

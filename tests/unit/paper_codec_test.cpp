@@ -44,9 +44,12 @@ std::pair<double, double> floor_share(const PointCloud& cloud, double z) {
 class PaperForms : public testing::TestWithParam<bool> {};
 
 TEST_P(PaperForms, KeepsTheRoom) {
+  PaperSettings settings = small_settings(GetParam());
+  settings.outside_density =
+      0.2;  // the published rule alone, with relArea 1, lets stray points fill the hole
   for (const Vec3& at : {Vec3{0, 0, 0}, Vec3{-7.3, 4.1, -2}, Vec3{1e6, 5e6, 100}}) {
     const PointCloud room = make_room(20000, at);
-    const PointCloud decoded = round_trip(room, small_settings(GetParam()));
+    const PointCloud decoded = round_trip(room, settings);
     const auto [original_share, ignored] = floor_share(room, at[2]);
     const auto [share, height] = floor_share(decoded, at[2]);
     EXPECT_NEAR(share, original_share, 0.02);
@@ -58,6 +61,15 @@ TEST_P(PaperForms, KeepsTheRoom) {
     }
     EXPECT_LT(in_hole, 20u);
   }
+}
+
+TEST_P(PaperForms, RelAreaOfThePaperKeepsAHoleEmpty) {
+  PaperSettings settings = small_settings(GetParam());
+  settings.rel_area = 200;  // of a cloud with some 700 points per square metre
+  const PointCloud decoded = round_trip(make_room(20000, {0, 0, 0}), settings);
+  std::size_t in_hole = 0;
+  for (const Vec3& p : decoded.xyz) in_hole += std::hypot(p[0] - 1.5, p[1] - 1) < 0.35 && p[2] < 0.02;
+  EXPECT_LT(in_hole, 20u);
 }
 
 TEST_P(PaperForms, KeepsColorsOfClusters) {

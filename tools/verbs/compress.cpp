@@ -61,6 +61,11 @@ void add_paper_settings(CLI::App& verb, PaperSettings& p) {
       ->capture_default_str();
   group->add_option("--rel-area", p.rel_area, "Least points per square metre of a kept triangle")
       ->capture_default_str();
+  group
+      ->add_option("--outside-density", p.outside_density,
+                   "Not in the paper: triangles beyond the outline need this share of the plane's density")
+      ->check(CLI::Range(0.0, 1.0))
+      ->capture_default_str();
 }
 
 void add_coding(CLI::App& verb, Arguments& a) {
