@@ -26,20 +26,6 @@ double largest_error(const Channel& a, const Channel& b) {
   return most;
 }
 
-Status check(const ChannelSchema& schema, const Channel& values, std::span<const VoxelCoord> voxels) {
-  const auto refuse = [&](const char* why) {
-    return make_error(ErrorCode::kInvalidArgument, "channel '" + schema.info.name + "': " + why);
-  };
-  if (schema.kept != ChannelKept::exact && schema.kept != ChannelKept::bounded)
-    return refuse("has nothing to encode");
-  if (values.info != schema.info || schema.info.stride() == 0)
-    return refuse("is not laid out as its schema says");
-  if (values.data.size() != voxels.size() * schema.info.stride())
-    return refuse("has not one value per point");
-  if (!(schema.bound >= 0) || !std::isfinite(schema.bound)) return refuse("has no proper bound");
-  return {};
-}
-
 Result<ChannelEncoding> encode_by_values(const ChannelSchema& schema, const Channel& values,
                                          std::span<const VoxelCoord> voxels, Effort effort) {
   ChannelEncoding e;
@@ -58,9 +44,23 @@ Result<ChannelEncoding> encode_by_values(const ChannelSchema& schema, const Chan
 
 }  // namespace
 
+Status check_channel(const ChannelSchema& schema, const Channel& values, std::span<const VoxelCoord> voxels) {
+  const auto refuse = [&](const char* why) {
+    return make_error(ErrorCode::kInvalidArgument, "channel '" + schema.info.name + "': " + why);
+  };
+  if (schema.kept != ChannelKept::exact && schema.kept != ChannelKept::bounded)
+    return refuse("has nothing to encode");
+  if (values.info != schema.info || schema.info.stride() == 0)
+    return refuse("is not laid out as its schema says");
+  if (values.data.size() != voxels.size() * schema.info.stride())
+    return refuse("has not one value per point");
+  if (!(schema.bound >= 0) || !std::isfinite(schema.bound)) return refuse("has no proper bound");
+  return {};
+}
+
 Result<ChannelEncoding> encode_channel(const ChannelSchema& schema, const Channel& values,
                                        std::span<const VoxelCoord> voxels, Effort effort) {
-  MAPCODEC_TRY(check(schema, values, voxels));
+  MAPCODEC_TRY(check_channel(schema, values, voxels));
   if (voxels.empty()) return ChannelEncoding{{}, values, 0};
   if (schema.kept == ChannelKept::bounded && schema.bound > 0 && is_color(schema.info)) {
     return encode_color(values, schema.bound, voxels, effort);

@@ -29,4 +29,8 @@ struct ChannelEncoding {
 [[nodiscard]] Result<ChannelEncoding> encode_channel(const ChannelSchema& schema, const Channel& values,
                                                      std::span<const VoxelCoord> voxels, Effort effort);
 
+/// Whether `values` are what `schema` says, one for each voxel. Errors: InvalidArgument. Threads: pure.
+[[nodiscard]] Status check_channel(const ChannelSchema& schema, const Channel& values,
+                                   std::span<const VoxelCoord> voxels);
+
 }  // namespace mapcodec

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "mapcodec/attribute/color_encoder.hpp"
 
-#include <memory>
+#include <map>
+#include <optional>
 #include <tuple>
 
 #include "mapcodec/attribute/channel_kind.hpp"
@@ -96,9 +97,11 @@ double rgb_distance(const Channel& a, const Channel& b, std::size_t i) {
   return std::sqrt(static_cast<double>(s));
 }
 
-class ColorSearch {
+}  // namespace
+
+class ColorEncoder::Search {
  public:
-  ColorSearch(const Channel& values, ColorScale scale, std::span<const VoxelCoord> voxels)
+  Search(const Channel& values, ColorScale scale, std::span<const VoxelCoord> voxels)
       : values_(values), tree_(voxels), originals_(values, scale) {
     settings_.scale = scale;
     ColorPoint m = originals_.mean(0, tree_.points());
@@ -110,7 +113,9 @@ class ColorSearch {
 
   ChannelEncoding run(double bound, Effort effort) {
     const double target = 0.995 * bound;
-    settings_.split_cells = floor_error() > 0.7 * bound;
+    const bool split_cells = floor_error() > 0.7 * bound;
+    if (split_cells != settings_.split_cells) tries_.clear();
+    settings_.split_cells = split_cells;
     settings_.step = search_step(target, effort);
     return finish();
   }
@@ -118,6 +123,10 @@ class ColorSearch {
  private:
   /// Error if each finest cell had its mean.
   double floor_error() {
+    if (!floor_error_) floor_error_ = measure_floor();
+    return *floor_error_;
+  }
+  double measure_floor() {
     Channel c = values_;
     const ColorLevel& finest = tree_.levels().back();
     for (std::uint32_t n = 0; n < finest.size(); ++n) {
@@ -156,11 +165,19 @@ class ColorSearch {
     return decoded;
   }
 
-  double try_step(std::uint32_t step) {
-    settings_.step = step;
-    settings_.levels = static_cast<std::uint32_t>(tree_.levels().size());
-    std::uint32_t deepest = 0;
-    return error_of(code(nullptr, deepest));
+  /// What comes out of a step.
+  struct Try {
+    double error = 0;
+    std::uint32_t deepest = 0;  ///< levels whose splits need coding
+  };
+  const Try& try_step(std::uint32_t step) {
+    const auto [at, added] = tries_.try_emplace(step);
+    if (added) {
+      settings_.step = step;
+      settings_.levels = static_cast<std::uint32_t>(tree_.levels().size());
+      at->second.error = error_of(code(nullptr, at->second.deepest));
+    }
+    return at->second;
   }
 
   /// The largest step found whose error is at most `target`: the error grows about as a power of the step, so
@@ -170,7 +187,7 @@ class ColorSearch {
     double low = 1, high = 1 << 20, guess = std::clamp(40 * target, 1.0, high);
     double low_error = 0, high_error = 0;
     for (int i = 0; i < tries && high - low >= 1; ++i) {
-      const double error = try_step(static_cast<std::uint32_t>(guess));
+      const double error = try_step(static_cast<std::uint32_t>(guess)).error;
       if (error <= target) {
         low = guess, low_error = error;
         if (error > 0.992 * target) break;
@@ -193,14 +210,8 @@ class ColorSearch {
   }
 
   ChannelEncoding finish() {
-    // Which levels need symbols at all is known after one more try.
-    std::uint32_t deepest = 0;
-    settings_.levels = static_cast<std::uint32_t>(tree_.levels().size());
-    if (settings_.split_cells) {
-      deepest = settings_.levels;
-    } else {
-      code(nullptr, deepest);
-    }
+    std::uint32_t deepest = static_cast<std::uint32_t>(tree_.levels().size());
+    if (!settings_.split_cells) deepest = try_step(settings_.step).deepest;
     settings_.levels = deepest;
     SymbolWriter side;
     ChannelEncoding e;
@@ -223,7 +234,11 @@ class ColorSearch {
   Originals originals_;
   ColorSettings settings_;
   ColorPoint head_{}, root_{};
+  std::optional<double> floor_error_;
+  std::map<std::uint32_t, Try> tries_;  ///< by their step
 };
+
+namespace {
 
 ColorScale scale_of(const Channel& values) {
   if (values.info.scalar == ScalarType::u8) return ColorScale::eight;
@@ -238,7 +253,16 @@ ColorScale scale_of(const Channel& values) {
 
 ChannelEncoding encode_color(const Channel& values, double bound, std::span<const VoxelCoord> voxels,
                              Effort effort) {
-  return ColorSearch(values, scale_of(values), voxels).run(bound, effort);
+  return ColorEncoder(values, voxels).encode(bound, effort);
+}
+
+ColorEncoder::ColorEncoder(const Channel& values, std::span<const VoxelCoord> voxels)
+    : search_(std::make_unique<Search>(values, scale_of(values), voxels)) {}
+
+ColorEncoder::~ColorEncoder() = default;
+
+ChannelEncoding ColorEncoder::encode(double bound, Effort effort) {
+  return search_->run(bound, effort);
 }
 
 }  // namespace mapcodec

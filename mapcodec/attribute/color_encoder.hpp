@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <memory>
+
 #include "mapcodec/attribute/channel_encoder.hpp"
 
 namespace mapcodec {
@@ -11,5 +13,19 @@ namespace mapcodec {
 /// @param voxels  Morton-sorted, coordinates below 2^21. Threads: pure.
 [[nodiscard]] ChannelEncoding encode_color(const Channel& values, double bound,
                                            std::span<const VoxelCoord> voxels, Effort effort);
+
+/// encode_color for one cloud and several bounds: what does not depend on the bound is worked out once.
+/// Threads: one at a time.
+class ColorEncoder {
+ public:
+  /// @param values, voxels  as above, not empty; must outlive this.
+  ColorEncoder(const Channel& values, std::span<const VoxelCoord> voxels);
+  ~ColorEncoder();
+  [[nodiscard]] ChannelEncoding encode(double bound, Effort effort);
+
+ private:
+  class Search;
+  std::unique_ptr<Search> search_;
+};
 
 }  // namespace mapcodec

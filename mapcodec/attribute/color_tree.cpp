@@ -5,6 +5,7 @@
 #include <bit>
 
 #include "mapcodec/geometry/morton.hpp"
+#include "mapcodec/geometry/octants.hpp"
 
 namespace mapcodec {
 namespace {
@@ -55,7 +56,9 @@ void ColorTree::build_levels(std::span<const VoxelCoord> voxels) {
   for (const VoxelCoord& v : voxels) keys.push_back(morton_encode(v));
   const std::uint32_t shift = 3 * finest_cells(count_splits(voxels), voxels.size()).first;
   ColorLevel level;
+  level.nodes.reserve(voxels.size() + 1);
   std::vector<std::uint64_t> cells;
+  cells.reserve(voxels.size());
   for (std::uint32_t i = 0; i < points_; ++i) {
     const std::uint64_t cell = keys[i] >> shift;
     if (!cells.empty() && cells.back() == cell) continue;
@@ -88,7 +91,7 @@ void ColorTree::link_faces(ColorLevel& level, const ColorLevel& parent) const {
   const auto child_of = [&](std::uint32_t node, std::uint32_t octant) {
     const ColorNode& n = parent.nodes[node];
     if (((n.mask >> octant) & 1) == 0) return kNoNode;
-    return n.child + static_cast<std::uint32_t>(std::popcount(n.mask & ((1u << octant) - 1)));
+    return n.child + kOctantRank[n.mask][octant] - 1;
   };
   for (std::uint32_t p = 0; p < parent.size(); ++p) {
     const ColorNode& n = parent.nodes[p];

@@ -11,6 +11,7 @@
 
 #include "mapcodec/attribute/color_space.hpp"
 #include "mapcodec/attribute/color_tree.hpp"
+#include "mapcodec/geometry/octants.hpp"
 
 namespace mapcodec {
 
@@ -38,6 +39,21 @@ struct SplitContext {
   return static_cast<std::uint64_t>(std::sqrt(static_cast<double>(gain)));
 }
 
+/// a / b, towards zero. Most weights are small: then a multiplication, exact since a's error, below 2^27 /
+/// 2^31, is less than the 1/15 that a quotient may lack to the next integer.
+[[nodiscard]] inline std::int64_t divide_by_weight(std::int64_t a, std::int64_t b) {
+  constexpr std::int64_t kMost = std::int64_t{1} << 27;
+  constexpr auto kInverse = [] {
+    std::array<std::int64_t, 16> t{};
+    for (std::int64_t w = 1; w < 16; ++w) t[static_cast<std::size_t>(w)] = (std::int64_t{1} << 31) / w + 1;
+    return t;
+  }();
+  if (b >= 16 || a >= kMost || a <= -kMost) return a / b;
+  const std::int64_t sign = a >> 63;  // 0 or -1
+  const std::int64_t q = (((a ^ sign) - sign) * kInverse[static_cast<std::size_t>(b)]) >> 31;
+  return (q ^ sign) - sign;
+}
+
 /// Policy: `std::array<std::int64_t, 3> code(const SplitContext&, const ColorPoint& wanted, const ColorPoint&
 /// steps)` gives the quantised differences; `wanted` (difference less prediction) means something only if
 /// Policy::kKnows, and then `truth(level)` gives the sums of the original values of the level's cells.
@@ -50,7 +66,7 @@ class ColorWalk {
       steps_[c] = static_cast<std::int64_t>(settings.step) * kColorLength[c] << (kColorFraction - 4);
     }
     for (std::size_t v = 1; v < kSmall; ++v) {
-      for (std::size_t w = 1; w < kSmall; ++w) small_[v * kSmall + w] = split_gain(v, w);
+      for (std::size_t w = 1; w < kSmall; ++w) small_[v * kSmall + w] = split_scale(v, w);
     }
   }
 
@@ -176,9 +192,7 @@ class ColorWalk {
       const std::uint32_t mirrored = octant ^ (1u << axis);
       const bool touching = face < n && ((other.mask >> mirrored) & 1) != 0;
       const ColorPoint& value =
-          touching ? next_[other.child +
-                           static_cast<std::uint32_t>(std::popcount(other.mask & ((1u << mirrored) - 1)))]
-                   : means_[face];
+          touching ? next_[other.child + kOctantRank[other.mask][mirrored] - 1] : means_[face];
       const std::int64_t w = touching ? kChildWeight : kFaceWeight;
       for (std::size_t c = 0; c < 3; ++c) sum[c] += value[c] * w;
       weight += w;
@@ -207,9 +221,12 @@ class ColorWalk {
     }
     ColorPoint predicted, wanted{};
     for (std::size_t c = 0; c < 3; ++c) {
-      predicted[c] = groups_.predicted[b][c] / w - groups_.predicted[a][c] / v;
-      if constexpr (Policy::kKnows)
-        wanted[c] = groups_.truth[b][c] / w - groups_.truth[a][c] / v - predicted[c];
+      predicted[c] =
+          divide_by_weight(groups_.predicted[b][c], w) - divide_by_weight(groups_.predicted[a][c], v);
+      if constexpr (Policy::kKnows) {
+        wanted[c] = divide_by_weight(groups_.truth[b][c], w) - divide_by_weight(groups_.truth[a][c], v) -
+                    predicted[c];
+      }
     }
     std::tie(groups_.mean[a], groups_.mean[b]) = split(groups_.mean[g], v, w, predicted, wanted, coded_);
   }
@@ -217,8 +234,11 @@ class ColorWalk {
   std::pair<ColorPoint, ColorPoint> split(const ColorPoint& m, std::int64_t v, std::int64_t w,
                                           const ColorPoint& predicted, const ColorPoint& wanted, bool coded) {
     ColorPoint d = predicted;
-    if (coded) add_coded(d, v, w, wanted);
-    const std::int64_t share = (w << 16) / (v + w);
+    const auto sv = static_cast<std::size_t>(v), sw = static_cast<std::size_t>(w);
+    if (sv >= kSmall || sw >= kSmall) large_ = split_scale(sv, sw);
+    const SplitScale& scale = sv < kSmall && sw < kSmall ? small_[sv * kSmall + sw] : large_;
+    if (coded) add_coded(d, scale, wanted);
+    const std::int64_t share = scale.share;
     std::pair<ColorPoint, ColorPoint> r;
     for (std::size_t c = 0; c < 3; ++c) {
       r.first[c] = m[c] - ((d[c] * share) >> 16);
@@ -227,14 +247,25 @@ class ColorWalk {
     return r;
   }
 
-  void add_coded(ColorPoint& d, std::int64_t v, std::int64_t w, const ColorPoint& wanted) {
-    const auto sv = static_cast<std::size_t>(v), sw = static_cast<std::size_t>(w);
-    const std::uint64_t gain = sv < kSmall && sw < kSmall ? small_[sv * kSmall + sw] : split_gain(sv, sw);
-    const auto root = static_cast<std::int64_t>(split_root(gain));
-    context_.gain =
-        static_cast<std::uint32_t>(std::clamp(static_cast<int>(std::bit_width(gain)) - 16, 0, 15));
+  /// What the weights of a split say.
+  struct SplitScale {
+    std::uint32_t gain;  ///< as in SplitContext
+    std::int64_t share;  ///< of the second child in the mean, in 1/65536
     ColorPoint steps;
-    for (std::size_t c = 0; c < 3; ++c) steps[c] = steps_[c] / root + 1;
+  };
+  [[nodiscard]] SplitScale split_scale(std::uint64_t v, std::uint64_t w) const {
+    const std::uint64_t gain = split_gain(v, w);
+    const auto root = static_cast<std::int64_t>(split_root(gain));
+    SplitScale s;
+    s.gain = static_cast<std::uint32_t>(std::clamp(static_cast<int>(std::bit_width(gain)) - 16, 0, 15));
+    s.share = static_cast<std::int64_t>((w << 16) / (v + w));
+    for (std::size_t c = 0; c < 3; ++c) s.steps[c] = steps_[c] / root + 1;
+    return s;
+  }
+
+  void add_coded(ColorPoint& d, const SplitScale& scale, const ColorPoint& wanted) {
+    context_.gain = scale.gain;
+    const ColorPoint& steps = scale.steps;
     const std::array<std::int64_t, 3> q = policy_.code(context_, wanted, steps);
     for (std::size_t c = 0; c < 3; ++c) {
       d[c] = std::clamp(d[c] + q[c] * steps[c], -kMostDifference, kMostDifference);
@@ -257,7 +288,8 @@ class ColorWalk {
   const ColorSettings settings_;
   Policy& policy_;
   ColorPoint steps_{};
-  std::array<std::uint64_t, kSmall * kSmall> small_{};
+  std::array<SplitScale, kSmall * kSmall> small_{};  ///< [v][w]
+  SplitScale large_{};
   std::vector<ColorPoint> means_, next_;
   std::vector<std::uint8_t> activity_, next_activity_, node_activity_;
   Groups groups_;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "mapcodec/codec/octree_decoder.hpp"
 
+#include <bit>
 #include <utility>
 
 #include "mapcodec/codec/octree_model.hpp"
@@ -18,6 +19,7 @@ struct DecoderSide {
 
   bool bit(bool, BitModel& model) { return in.decode(model); }
   bool bit(bool, std::uint32_t p1) { return in.decode(p1); }
+  std::uint32_t mask(bool, std::uint32_t p1) { return in.decode_mask(p1); }
   std::uint64_t integer(std::uint64_t, IntegerModel& model) { return model.decode(in); }
 };
 
@@ -29,7 +31,7 @@ Error ended() {
 class OctreeReader {
  public:
   OctreeReader(ByteSpan code, const Mode& mode, std::uint64_t points, const DecodeLimits& limits)
-      : side_{RangeDecoder(code)}, mode_(mode), points_(points), limits_(limits), model_(side_, mode) {}
+      : side_{RangeDecoder(code)}, mode_(mode), points_(points), limits_(limits), model_(mode) {}
 
   Result<std::vector<VoxelCoord>> read(std::uint32_t depth) {
     nodes_.make_root();
@@ -43,21 +45,36 @@ class OctreeReader {
   }
 
  private:
+  /// Calls `f(i)` for each node of the current level as soon as it is made of its parent, until one is false:
+  /// while the code decides the masks bit after bit, the processor can already make the nodes that follow.
+  template <class F>
+  bool for_each_node(F&& f) {
+    if (at_root_) return f(1);
+    for (std::uint32_t p = 1; p < parents_.size(); ++p) {
+      for (std::uint32_t left = parents_.links[p].mask; left != 0; left &= left - 1) {
+        if (!f(nodes_.append_child(parents_, p, static_cast<std::uint32_t>(std::countr_zero(left)))))
+          return false;
+      }
+    }
+    return true;
+  }
+
   Status read_level(std::uint32_t bits, std::uint32_t below) {
     model_.start_level(bits, below);
-    std::uint32_t next = 1;
-    for (std::uint32_t i = 1; i < nodes_.size(); ++i) {
-      if (!side_.in.ok()) return ended();
-      const std::uint32_t mask = model_.code_children(nodes_, i, 0, false);
-      nodes_.links[i] = {next, mask};
-      next += octree::kPopCount[mask];
-    }
-    if (next - 1 > points_) return make_error(ErrorCode::kMalformed, "octree has more cells than points");
-    children_ = next - 1;
+    std::uint32_t children = 0;
+    const bool whole = for_each_node([&](std::uint32_t i) {
+      const std::uint32_t mask = model_.code_children(side_, nodes_, i, 0, false);
+      nodes_.links[i] = {children, mask};
+      children += kOctantCount[mask];
+      return side_.in.ok();
+    });
+    if (!whole) return ended();
+    if (children > points_) return make_error(ErrorCode::kMalformed, "octree has more cells than points");
+    children_ = children;
     return {};
   }
 
-  /// Makes the children of the current level the current level.
+  /// Makes the current level the parents of the next, whose nodes are still to be made.
   Status descend() {
     constexpr std::uint64_t kPerNode = 2 * (sizeof(octree::Node) + sizeof(octree::Link) + sizeof(VoxelCoord));
     if ((children_ + 1) * kPerNode > limits_.max_bytes) {
@@ -65,22 +82,22 @@ class OctreeReader {
     }
     std::swap(nodes_, parents_);
     nodes_.reset(children_);
-    for (std::uint32_t p = 1; p < parents_.size(); ++p) nodes_.append_children(parents_, p);
+    at_root_ = false;
     return {};
   }
 
   Status read_counts() {
-    if (!mode_.counts) return check_sum(nodes_.size() - 1);
-    counts_.assign(nodes_.size(), 0);
+    const std::size_t leaves = at_root_ ? 1 : children_;
+    counts_.assign(mode_.counts ? leaves + 1 : 0, 0);
     std::uint64_t sum = 0;
-    for (std::uint32_t i = 1; i < nodes_.size(); ++i) {
-      if (!side_.in.ok()) return ended();
-      const std::uint64_t n = model_.code_count(nodes_.nodes[i], counts_, i, 0);
-      if (n == 0 || n > points_ - sum)
-        return make_error(ErrorCode::kMalformed, "octree counts exceed the points");
-      counts_[i] = static_cast<std::uint32_t>(n);
+    const bool whole = for_each_node([&](std::uint32_t i) {
+      const std::uint64_t n = mode_.counts ? model_.code_count(side_, nodes_.nodes[i], counts_, i, 0) : 1;
+      if (n == 0 || n > points_ - sum) return false;
+      if (mode_.counts) counts_[i] = static_cast<std::uint32_t>(n);
       sum += n;
-    }
+      return side_.in.ok();
+    });
+    if (!whole && side_.in.ok()) return make_error(ErrorCode::kMalformed, "octree counts exceed the points");
     return check_sum(sum);
   }
 
@@ -95,7 +112,9 @@ class OctreeReader {
   std::vector<VoxelCoord> expand() const {
     std::vector<VoxelCoord> cells;
     cells.reserve(points_);
-    for (std::uint32_t i = 1; i < nodes_.size(); ++i) cells.insert(cells.end(), count(i), nodes_.nodes[i].at);
+    for (std::uint32_t i = 1; i < nodes_.size(); ++i) {
+      for (std::uint32_t left = count(i); left > 0; --left) cells.push_back(nodes_.nodes[i].at);
+    }
     return cells;
   }
 
@@ -127,6 +146,7 @@ class OctreeReader {
   octree::Model<DecoderSide> model_;
   Level nodes_, parents_;
   std::uint64_t children_ = 0;
+  bool at_root_ = true;  ///< the current level is the root's
   std::vector<std::uint32_t> counts_;
 };
 

@@ -23,18 +23,19 @@ struct Truth {
 };
 
 struct EncoderSide {
-  RangeEncoder& out;
+  RangeEncoder* out;
 
   bool bit(bool known, BitModel& model) {
-    out.encode(known, model);
+    out->encode(known, model);
     return known;
   }
   bool bit(bool known, std::uint32_t p1) {
-    out.encode(known, p1);
+    out->encode(known, p1);
     return known;
   }
+  std::uint32_t mask(bool known, std::uint32_t p1) { return 0 - std::uint32_t{bit(known, p1)}; }
   std::uint64_t integer(std::uint64_t known, IntegerModel& model) {
-    model.encode(out, known);
+    model.encode(*out, known);
     return known;
   }
 };
@@ -94,23 +95,23 @@ bool singles_pay(const std::vector<Truth>& levels) {
   return 4 * saved >= 3 * flags;
 }
 
-void encode_levels(octree::Model<EncoderSide>& model, const std::vector<Truth>& levels, Level& nodes,
-                   Level& spare) {
+void encode_levels(octree::Model<EncoderSide>& model, EncoderSide& side, const std::vector<Truth>& levels,
+                   Level& nodes, Level& spare) {
   nodes.make_root();
   const auto depth = static_cast<std::uint32_t>(levels.size());
   for (std::uint32_t l = 0; l < depth; ++l) {
     const Truth& truth = levels[l];
     if (l > 0) {
       std::swap(nodes, spare);
-      nodes.reset(truth.mask.size());
-      for (std::uint32_t p = 1; p < spare.size(); ++p) nodes.append_children(spare, p);
+      nodes.append_level(spare, truth.mask.size());
     }
     model.start_level(l, depth - l);
-    std::uint32_t next = 1;
+    std::uint32_t before = 0;  // children of earlier nodes
     for (std::uint32_t i = 1; i < nodes.size(); ++i) {
-      const std::uint32_t mask = model.code_children(nodes, i, truth.mask[i - 1], truth.single[i - 1] != 0);
-      nodes.links[i] = {next, mask};
-      next += octree::kPopCount[mask];
+      const std::uint32_t mask =
+          model.code_children(side, nodes, i, truth.mask[i - 1], truth.single[i - 1] != 0);
+      nodes.links[i] = {before, mask};
+      before += kOctantCount[mask];
     }
   }
 }
@@ -169,17 +170,16 @@ void encode_tail(RangeEncoder& out, std::span<const std::uint64_t> keys,
   }
 }
 
-void encode_counts(octree::Model<EncoderSide>& model, const Level& parents, Level& leaves,
+void encode_counts(octree::Model<EncoderSide>& model, EncoderSide& side, const Level& parents, Level& leaves,
                    const std::vector<std::uint32_t>& counts, bool root_alone) {
   if (root_alone) {
     leaves.make_root();
   } else {
-    leaves.reset(counts.size());
-    for (std::uint32_t p = 1; p < parents.size(); ++p) leaves.append_children(parents, p);
+    leaves.append_level(parents, counts.size());
   }
   std::vector<std::uint32_t> known(counts.size() + 1, 0);
   for (std::uint32_t i = 1; i <= counts.size(); ++i) {
-    model.code_count(leaves.nodes[i], known, i, counts[i - 1]);
+    model.code_count(side, leaves.nodes[i], known, i, counts[i - 1]);
     known[i] = counts[i - 1];
   }
 }
@@ -204,11 +204,11 @@ struct Task {
 
 Bytes encode_in(const Mode& mode, const Task& task) {
   RangeEncoder out;
-  EncoderSide side{out};
-  octree::Model<EncoderSide> model(side, mode);
+  EncoderSide side{&out};
+  octree::Model<EncoderSide> model(mode);
   Level nodes, spare;
-  encode_levels(model, task.levels, nodes, spare);
-  if (mode.counts) encode_counts(model, nodes, spare, task.coarse.counts, task.levels.empty());
+  encode_levels(model, side, task.levels, nodes, spare);
+  if (mode.counts) encode_counts(model, side, nodes, spare, task.coarse.counts, task.levels.empty());
   encode_tail(out, task.keys, task.counts, mode.tail);
   Bytes bytes{mode.byte()};
   const Bytes code = out.finish();

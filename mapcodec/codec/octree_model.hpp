@@ -3,10 +3,12 @@
 // and decoder cannot disagree. `Side` has
 //   bool bit(bool known, BitModel&)                 codes `known` and returns it, or ignores it and decodes
 //   bool bit(bool known, std::uint32_t p1)          the same with a given probability
+//   std::uint32_t mask(bool known, std::uint32_t p1)  the same as a mask, all ones or zero
 //   std::uint64_t integer(std::uint64_t known, IntegerModel&)
 #pragma once
 
 #include <algorithm>
+#include <vector>
 
 #include "mapcodec/codec/octree_tables.hpp"
 #include "mapcodec/entropy/integer_model.hpp"
@@ -32,7 +34,7 @@ struct Mode {
 template <class Side>
 class Model {
  public:
-  Model(Side& side, const Mode& mode) : side_(side), mode_(mode), occupancy_(kHistories * kTouches) {
+  explicit Model(const Mode& mode) : mode_(mode), occupancy_(kHistories * kTouches) {
     if (mode.mixing) {
       by_slab_.resize(kHistories * 8);
       by_size_.resize(kHistories * 64);
@@ -52,29 +54,30 @@ class Model {
 
   /// Codes which children node `i` has (never none) and, once, whether it holds a single voxel.
   /// @param mask, single  the truth; ignored by a decoder.
-  std::uint32_t code_children(Level& level, std::uint32_t i, std::uint32_t mask, bool single) {
+  std::uint32_t code_children(Side& side, Level& level, std::uint32_t i, std::uint32_t mask, bool single) {
     Node& node = level.nodes[i];
     const Around around = look_around(level, node);
-    if (mode_.singles && below_ >= 2 && !node.single) node.single = code_single_flag(node, around, single);
+    if (mode_.singles && below_ >= 2 && !node.single)
+      node.single = code_single_flag(side, node, around, single);
     if (node.single) {
-      mask = code_single(around, mask);
+      mask = code_single(side, around, mask);
     } else {
-      mask = mode_.mixing ? code_mixed(node, around, mask) : code_plain(around, mask);
+      mask = mode_.mixing ? code_mixed(side, node, around, mask) : code_plain(side, around, mask);
     }
     for (std::size_t axis = 0; axis < 3; ++axis) slab_[axis][node.at[axis]] = kHalves[axis][mask];
     return mask;
   }
 
   /// Codes the count (>= 1) of leaf `i`; `counts` holds those of the leaves before it, index 0 is nobody's 0.
-  std::uint64_t code_count(const Node& leaf, const std::vector<std::uint32_t>& counts, std::uint32_t i,
-                           std::uint64_t known) {
+  std::uint64_t code_count(Side& side, const Node& leaf, const std::vector<std::uint32_t>& counts,
+                           std::uint32_t i, std::uint64_t known) {
     const CountContext context = count_context(leaf, counts, i);
-    if (context.large) return 1 + side_.integer(known - 1, count_integer_[context.level]);
+    if (context.large) return 1 + side.integer(known - 1, count_integer_[context.level]);
     BitModel* more = &count_more_[(context.level * 7 + context.faces) * kCountUnary];
     for (std::uint32_t v = 1; v <= kCountUnary; ++v) {
-      if (!side_.bit(known > v, more[v - 1])) return v;
+      if (!side.bit(known > v, more[v - 1])) return v;
     }
-    return kCountUnary + 1 + side_.integer(known - kCountUnary - 1, count_rest_);
+    return kCountUnary + 1 + side.integer(known - kCountUnary - 1, count_rest_);
   }
 
  private:
@@ -102,27 +105,35 @@ class Model {
     return a;
   }
 
-  bool code_single_flag(const Node& node, const Around& around, bool known) {
+  bool code_single_flag(Side& side, const Node& node, const Around& around, bool known) {
     const std::uint32_t context = (std::min(below_, 8u) - 1) * 63 + around.faces * 9 + node.siblings;
-    return side_.bit(known, single_flag_[context]);
+    return side.bit(known, single_flag_[context]);
   }
 
   // One bit for each of z, y, x: which half holds the voxel.
-  std::uint32_t code_single(const Around& around, std::uint32_t known) {
-    std::uint32_t child = 0;
-    for (std::uint32_t axis = 3; axis-- > 0;) {
-      const std::uint32_t other = axis == 0 ? 1 : 0;
-      const std::uint32_t third = axis == 2 ? 1 : 2;
-      const std::uint32_t touching =
-          around.before[axis] == 0 ? 0 : 1 + (kHalves[axis][around.before[axis]] >> 1);
-      std::uint32_t context = (axis * 4 + around.slab[axis]) * 3 + touching;
-      context = context * 2 + around.after[axis];
-      context = context * 4 + kHalves[axis][around.before[other]];
-      context = context * 4 + kHalves[axis][around.before[third]];
-      const bool high = side_.bit((known & kHalfMask[axis][1]) != 0, single_bit_[context]);
-      child |= std::uint32_t{high} << axis;
-    }
-    return 1u << child;
+  std::uint32_t code_single(Side& shared, const Around& around, std::uint32_t known) {
+    Side side = shared;
+    std::uint32_t mask = 0xff;
+    mask &= kHalfMask[2][0] ^ code_half<2>(side, around, known);
+    mask &= kHalfMask[1][0] ^ code_half<1>(side, around, known);
+    mask &= kHalfMask[0][0] ^ code_half<0>(side, around, known);
+    shared = side;
+    return mask;
+  }
+
+  /// All ones for the high half, zero for the low one.
+  template <std::uint32_t axis>
+  std::uint32_t code_half(Side& side, const Around& around, std::uint32_t known) {
+    constexpr std::uint32_t kOther = axis == 0 ? 1 : 0;
+    constexpr std::uint32_t kThird = axis == 2 ? 1 : 2;
+    std::uint32_t context = (axis * 4 + around.slab[axis]) * 6;
+    context += kSingleTouch[axis][around.before[axis]] + around.after[axis];
+    context = context * 4 + kHalves[axis][around.before[kOther]];
+    context = context * 4 + kHalves[axis][around.before[kThird]];
+    BitModel& model = single_bit_[context];
+    const std::uint32_t one = side.mask((known & kHalfMask[axis][1]) != 0, model.probability());
+    model.learn(one);
+    return one;
   }
 
   static std::uint64_t touches(const Around& a) {
@@ -130,21 +141,40 @@ class Model {
            kTouch[2][a.after[2]][a.before[2]];
   }
 
-  // `history` is a 1 followed by the bits coded so far. Seven zeros make the eighth bit a 1.
-  std::uint32_t code_plain(const Around& around, std::uint32_t known) {
+  // `history` is a 1 followed by the bits coded so far. Seven zeros make the eighth bit a 1. The contexts of
+  // both values of a bit are fetched before it is known: a decoder then waits for its arithmetic alone, which
+  // a local copy of the side keeps in registers.
+  std::uint32_t code_plain(Side& shared, const Around& around, std::uint32_t known) {
+    Side side = shared;
     std::uint64_t touch = touches(around);
+    BitModel* model = &occupancy_[(touch & 0xff) * kHistories + 1];
+    std::uint32_t p1 = model->probability();
     std::uint32_t history = 1;
     std::uint32_t mask = 0;
-    for (std::uint32_t i = 0; i < 7; ++i, touch >>= 8) {
-      const bool bit = side_.bit((known >> i & 1) != 0, occupancy_[history * kTouches + (touch & 0xff)]);
-      history = 2 * history + bit;
-      mask |= std::uint32_t{bit} << i;
+#pragma GCC unroll 7
+    for (std::uint32_t i = 0; i < 7; ++i) {
+      touch >>= 8;
+      BitModel* const next = &occupancy_[(touch & 0xff) * kHistories + 2 * history];
+      const std::uint32_t after_zero = next[0].probability(), after_one = next[1].probability();
+      const std::uint32_t one = side.mask((known >> i & 1) != 0, p1);
+      model->learn(one);
+      p1 = after_zero ^ ((after_zero ^ after_one) & one);
+      model = next + (one & 1);
+      history = 2 * history + (one & 1);
+      mask |= one & 1u << i;
     }
-    if (mask == 0) return 128;
-    return mask | std::uint32_t{side_.bit((known >> 7) != 0, occupancy_[history * kTouches + touch])} << 7;
+    if (mask == 0) {
+      mask = 128;
+    } else {
+      const std::uint32_t one = side.mask((known >> 7) != 0, p1);
+      model->learn(one);
+      mask |= one & 128;
+    }
+    shared = side;
+    return mask;
   }
 
-  std::uint32_t code_mixed(const Node& node, const Around& around, std::uint32_t known) {
+  std::uint32_t code_mixed(Side& side, const Node& node, const Around& around, std::uint32_t known) {
     std::uint64_t touch = touches(around);
     std::uint64_t slab = kSlabWord[around.slab[0] | around.slab[1] << 2 | around.slab[2] << 4];
     const std::uint32_t size = (node.siblings == 0 ? 0u : node.siblings - 1u) * 8 + std::min(below_, 8u) - 1;
@@ -152,19 +182,19 @@ class Model {
     std::uint32_t mask = 0;
     for (std::uint32_t i = 0; i < 8; ++i, touch >>= 8, slab >>= 8) {
       if (history == 128) return 128;
-      BitModel& a = occupancy_[history * kTouches + (touch & 0xff)];
+      BitModel& a = occupancy_[(touch & 0xff) * kHistories + history];
       BitModel& b = by_slab_[history * 8 + (slab & 7)];
       BitModel& c = by_size_[history * 64 + size];
-      const bool bit = code_from_three((known >> i & 1) != 0, a, b, c, mixers_[i]);
+      const bool bit = code_from_three(side, (known >> i & 1) != 0, a, b, c, mixers_[i]);
       history = 2 * history + bit;
       mask |= std::uint32_t{bit} << i;
     }
     return mask;
   }
 
-  bool code_from_three(bool known, BitModel& a, BitModel& b, BitModel& c, LogisticMixer& mixer) {
+  bool code_from_three(Side& side, bool known, BitModel& a, BitModel& b, BitModel& c, LogisticMixer& mixer) {
     const LogisticMixer::Mixed mixed = mixer.predict(a, b, c);
-    const bool bit = side_.bit(known, mixed.probability);
+    const bool bit = side.bit(known, mixed.probability);
     mixer.update(mixed, bit);
     a.update(bit);
     b.update(bit);
@@ -194,15 +224,11 @@ class Model {
       const auto level = static_cast<std::uint32_t>(std::bit_width(sum / terms));  // >= 4
       return {std::min(level, kCountIntegers + 3) - 4, faces, true};
     }
-    const std::uint32_t quarters[] = {4, 5, 6, 8, 12, 20};
-    std::uint32_t level = 0;
-    while (level < 6 && 4 * sum > quarters[level] * terms) ++level;
-    return {level, faces, false};
+    return {kCountClass[terms][sum], faces, false};
   }
 
   static constexpr std::uint32_t kCountIntegers = 8;
 
-  Side& side_;
   Mode mode_;
   std::uint32_t below_ = 0;
   std::array<std::vector<std::uint8_t>, 3> slab_;

@@ -19,6 +19,28 @@ inline constexpr std::array<std::array<std::uint8_t, 256>, 3> kHalves = [] {
   return t;
 }();
 
+/// Twice what a lone child sees in the coded neighbour before along an axis: 0 no node, 1 none that touches,
+/// 2 one that does.
+inline constexpr std::array<std::array<std::uint8_t, 256>, 3> kSingleTouch = [] {
+  std::array<std::array<std::uint8_t, 256>, 3> t{};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    for (std::size_t m = 1; m < 256; ++m) t[axis][m] = (m & kHalfMask[axis][1]) != 0 ? 4 : 2;
+  }
+  return t;
+}();
+
+/// [terms][sum], sum / terms a mean count of 1/4 to 8: its class, the number of limits below it.
+inline constexpr std::array<std::array<std::uint8_t, 33>, 5> kCountClass = [] {
+  constexpr std::uint32_t kQuarters[] = {4, 5, 6, 8, 12, 20};
+  std::array<std::array<std::uint8_t, 33>, 5> t{};
+  for (std::uint32_t terms = 1; terms < 5; ++terms) {
+    for (std::uint32_t sum = 0; sum <= 32; ++sum) {
+      for (const std::uint32_t q : kQuarters) t[terms][sum] += 4 * sum > q * terms;
+    }
+  }
+  return t;
+}();
+
 /// What child `i` sees across the faces of its parent along one axis, from the mask of the coded neighbour
 /// before (0: none) and whether there is a neighbour after: low children 0 no node, 1 a node, 2 an occupied
 /// cell that touches the child; high children 0 or 1, a node after. Times 3^axis.

@@ -4,6 +4,9 @@
 #include <array>
 #include <cmath>
 
+#include "mapcodec/attribute/color_decoder.hpp"
+#include "mapcodec/attribute/color_encoder.hpp"
+
 namespace mapcodec {
 namespace {
 
@@ -101,15 +104,22 @@ Result<ChannelEncoding> encode_tile_color(const ChannelSchema& channel, const Ch
   // cost bits and raise the measured error.
   const Channel merged = merge_voxels(values, context.voxels);
   const double floor = measured_error(context, values, merged) / channel.bound;
-  ChannelSchema target = channel;
+  if (context.voxels.empty() || !(channel.bound > 0) || !is_color(channel.info)) {
+    MAPCODEC_ASSIGN(ChannelEncoding e, encode_channel(channel, merged, context.voxels, effort));
+    e.error = measured_error(context, values, e.decoded);
+    return e;
+  }
+  MAPCODEC_TRY(check_channel(channel, merged, context.voxels));
+  ColorEncoder encoder(merged, context.voxels);
+  double bound = channel.bound;
   // The loss of merging and that of coding add up about as independent errors do.
-  target.bound *= std::max(0.3, std::sqrt(std::max(0.0, 1 - floor * floor)));
+  bound *= std::max(0.3, std::sqrt(std::max(0.0, 1 - floor * floor)));
   constexpr int kTries = 4;
   for (int i = 0;; ++i) {
-    MAPCODEC_ASSIGN(ChannelEncoding e, encode_channel(target, merged, context.voxels, effort));
+    ChannelEncoding e = encoder.encode(bound, effort);
     e.error = measured_error(context, values, e.decoded);
     if (e.error <= channel.bound || floor >= 1 || i + 1 == kTries) return e;
-    target.bound *= std::max(0.5, 0.97 * channel.bound / e.error);
+    bound *= std::max(0.5, 0.97 * channel.bound / e.error);
   }
 }
 

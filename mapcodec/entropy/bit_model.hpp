@@ -12,34 +12,53 @@ namespace mapcodec {
 /// kMinProbability].
 inline constexpr std::uint32_t kMinProbability = 32;
 
-/// 65536 / (n + 1.6) for n = 0..: the step of a running mean that starts with a little doubt.
-inline constexpr std::array<std::uint16_t, 128> kAdaptationStep = [] {
-  std::array<std::uint16_t, 128> t{};
-  for (std::uint32_t n = 0; n < 128; ++n) t[n] = static_cast<std::uint16_t>(655360u / (10 * n + 16));
+/// How a context that has seen `n` bits learns from the next.
+struct alignas(8) Adaptation {
+  std::uint16_t slow_step, fast_step;  ///< shares of the way to the bit, in 1/65536
+  std::uint16_t next;                  ///< its n afterwards
+};
+/// Slow steps are 65536 / (n + 1.6), those of a running mean that starts with a little doubt, to the n where
+/// they are 1/128; fast ones stay from 1/16.
+inline constexpr std::array<Adaptation, 127> kAdaptation = [] {
+  std::array<Adaptation, 127> t{};
+  for (std::uint32_t n = 0; n < t.size(); ++n) {
+    const std::uint32_t step = 655360u / (10 * n + 16);
+    t[n] = {static_cast<std::uint16_t>(step), static_cast<std::uint16_t>(step < 4096 ? 4096 : step),
+            static_cast<std::uint16_t>(n + 1 < t.size() ? n + 1 : n)};
+  }
   return t;
 }();
 
 /// Mean of two estimators with rates max(1/(n+1.6), 1/16) and max(1/(n+1.6), 1/128): the fast one follows
 /// changes, the slow one settles.
-class BitModel {
+class alignas(8) BitModel {
  public:
-  [[nodiscard]] std::uint32_t probability() const { return (std::uint32_t{fast_} + slow_) >> 1; }
+  BitModel() = default;
+  /// Begins at `probability` (of a 1) as if `experience` bits had been seen.
+  constexpr BitModel(std::uint16_t probability, std::uint16_t experience)
+      : fast_(probability), slow_(probability), mean_(probability), count_(experience) {}
 
-  void update(bool bit) {
+  [[nodiscard]] std::uint32_t probability() const { return mean_; }
+
+  void update(bool bit) { learn(0 - std::uint32_t{bit}); }
+  /// The same for a bit given as a mask, all ones or zero.
+  void learn(std::uint32_t one) {
     // Targets short of 0 and 65536: no estimate ever passes them, so no probability needs clamping.
-    const std::int32_t target = bit ? 65536 - kMargin : kMargin;
-    const std::int32_t slow_step = kAdaptationStep[count_];
-    const std::int32_t fast_step = slow_step < 4096 ? 4096 : slow_step;
-    fast_ = static_cast<std::uint16_t>(fast_ + (((target - fast_) * fast_step) >> 16));
-    slow_ = static_cast<std::uint16_t>(slow_ + (((target - slow_) * slow_step) >> 16));
-    count_ = static_cast<std::uint16_t>(count_ + (count_ < kLimit));
+    const auto target = static_cast<std::int32_t>(kMargin + (one & (65536 - 2 * kMargin)));
+    const Adaptation& step = kAdaptation[count_];
+    const std::int32_t fast = fast_ + (((target - fast_) * step.fast_step) >> 16);
+    const std::int32_t slow = slow_ + (((target - slow_) * step.slow_step) >> 16);
+    fast_ = static_cast<std::uint16_t>(fast);
+    slow_ = static_cast<std::uint16_t>(slow);
+    mean_ = static_cast<std::uint16_t>(static_cast<std::uint32_t>(fast + slow) >> 1);
+    count_ = step.next;
   }
 
  private:
-  static constexpr std::int32_t kMargin = kMinProbability;
-  static constexpr std::uint16_t kLimit = 126;  // 1/(126+1.6) = 1/128
+  static constexpr std::uint32_t kMargin = kMinProbability;
   std::uint16_t fast_ = 32768;
   std::uint16_t slow_ = 32768;
+  std::uint16_t mean_ = 32768;  ///< of the two: read more often than written
   std::uint16_t count_ = 0;
 };
 

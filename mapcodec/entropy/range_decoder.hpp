@@ -10,25 +10,27 @@ namespace mapcodec {
 /// bytes are damaged, and `ok()` is false for good.
 class RangeDecoder {
  public:
-  explicit RangeDecoder(ByteSpan bytes) : bytes_(bytes) {
+  explicit RangeDecoder(ByteSpan bytes) : at_(bytes.data()), left_(bytes.size()) {
     code_ = next_word() << 32;
     code_ |= next_word();
   }
 
-  bool decode(std::uint32_t p1) {
-    const std::uint64_t bound = (range_ >> 16) * p1;
-    const bool bit = code_ < bound;
-    const std::uint64_t zero =
-        std::uint64_t{bit} - 1;  // all ones for a 0: no branch on what cannot be predicted
-    code_ -= bound & zero;
-    range_ = bound ^ ((bound ^ (range_ - bound)) & zero);
-    if (range_ < kRenormalise) shift_in();
-    return bit;
-  }
+  bool decode(std::uint32_t p1) { return decode_mask(p1) != 0; }
   bool decode(BitModel& model) {
-    const bool bit = decode(model.probability());
-    model.update(bit);
-    return bit;
+    const std::uint32_t one = decode_mask(model.probability());
+    model.learn(one);
+    return one != 0;
+  }
+  /// The bit as a mask: all ones or zero.
+  std::uint32_t decode_mask(std::uint32_t p1) {
+    const std::uint64_t bound = (range_ >> 16) * p1;
+    // No branch on what cannot be predicted.
+    const std::uint64_t one = 0 - static_cast<std::uint64_t>(code_ < bound);
+    const std::uint64_t rest = range_ - bound;
+    code_ = (code_ - bound) + (bound & one);
+    range_ = rest ^ ((rest ^ bound) & one);
+    if (range_ < kRenormalise) shift_in();
+    return static_cast<std::uint32_t>(one);
   }
   /// `count` (0..64) bits written by encode_raw.
   std::uint64_t decode_raw(int count) {
@@ -64,20 +66,27 @@ class RangeDecoder {
     code_ = (code_ << 32) | next_word();
   }
   std::uint64_t next_word() {
-    std::uint64_t v = 0;
-    for (int i = 0; i < 4; ++i) v = (v << 8) | next_byte();
+    const std::size_t taken = left_ < 4 ? left_ : 4;
+    const std::uint64_t v = taken == 4 ? std::uint64_t{at_[0]} << 24 | std::uint64_t{at_[1]} << 16 |
+                                             std::uint64_t{at_[2]} << 8 | at_[3]
+                                       : last_word(at_, taken);
+    at_ += taken;
+    left_ -= taken;
+    assumed_ += static_cast<std::uint32_t>(4 - taken);
+    if (assumed_ > kAssumedLimit) assumed_ = kAssumedLimit + 1;
     return v;
   }
-  std::uint64_t next_byte() {
-    if (at_ < bytes_.size()) return bytes_[at_++];
-    assumed_ += assumed_ <= kAssumedLimit;
-    return 0;
+  // Static, so that a decoder in a local variable can stay in registers.
+  static std::uint64_t last_word(const std::uint8_t* at, std::size_t count) {
+    std::uint64_t v = 0;
+    for (std::size_t i = 0; i < 4; ++i) v = (v << 8) | (i < count ? at[i] : 0);
+    return v;
   }
 
   std::uint64_t range_ = ~std::uint64_t{0};
   std::uint64_t code_ = 0;
-  ByteSpan bytes_;
-  std::size_t at_ = 0;
+  const std::uint8_t* at_;
+  std::size_t left_;
   std::uint32_t assumed_ = 0;
 };
 
