@@ -12,6 +12,7 @@
 #include <cstring>
 
 #include "mapcodec/base/crc32c.hpp"
+#include "maps/stale_files.hpp"
 
 namespace mapcodec {
 namespace {
@@ -146,6 +147,7 @@ Result<std::unique_ptr<FileStore>> FileStore::open_for_writing(const std::string
 
 Result<std::unique_ptr<FileStore>> FileStore::create(const std::string& path, bool overwrite) {
   MAPCODEC_ASSIGN(FileHandle replaced, lock_replaced(path, overwrite));
+  remove_stale_temporaries(path);
   FileHandle file;
   std::string temporary;
   for (int attempt = 0; attempt < 100 && !file.is_open(); ++attempt) {
@@ -181,7 +183,7 @@ Error FileStore::broken(const std::string& what) {
 Status FileStore::write(ByteSpan bytes) {
   if (!writable_) return broken("is open for reading only");
   if (broken_) return cannot_write("an earlier write failed, nothing more is written");
-  const Status written = write_all(file_.fd(), bytes, end_);
+  Status written = write_all(file_.fd(), bytes, end_);
   broken_ = !written.ok();
   end_ += bytes.size();  // also of a failed write, so that destruction cuts off its beginning
   return written;
@@ -201,7 +203,7 @@ Status FileStore::take_name() {
   }
   temporary_.clear();
   replaced_ = FileHandle();
-  const Status synced = sync_folder(folder_of(path_));
+  Status synced = sync_folder(folder_of(path_));
   broken_ = !synced.ok();
   return synced;
 }

@@ -206,7 +206,7 @@ void coarsen(LosslessLayout& layout, std::uint32_t level) {
 
 }  // namespace
 
-LosslessLayout lay_out_lossless(std::span<const Vec3> xyz, std::vector<std::uint32_t> finite,
+LosslessLayout lay_out_lossless(std::span<const Vec3> xyz, const std::vector<std::uint32_t>& finite,
                                 const CoordinateFormat& format, Effort effort) {
   LosslessLayout layout;
   std::array<Axis, 3> axes;

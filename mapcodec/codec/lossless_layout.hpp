@@ -21,7 +21,8 @@ struct LosslessLayout {
 };
 
 /// @param finite  indices of the points of `xyz` to lay out; not empty.
-[[nodiscard]] LosslessLayout lay_out_lossless(std::span<const Vec3> xyz, std::vector<std::uint32_t> finite,
+[[nodiscard]] LosslessLayout lay_out_lossless(std::span<const Vec3> xyz,
+                                              const std::vector<std::uint32_t>& finite,
                                               const CoordinateFormat& format, Effort effort);
 
 }  // namespace mapcodec

@@ -51,6 +51,7 @@ std::vector<std::uint32_t> NeighborIndex::within(const Vec3& query, double radiu
   std::vector<std::pair<std::uint32_t, double>> hits;
   impl_->tree.radiusSearch(query.data(), radius_m * radius_m, hits, nanoflann::SearchParams(0, 0.0F, false));
   std::vector<std::uint32_t> ids;
+  ids.reserve(hits.size());
   for (const auto& hit : hits) ids.push_back(hit.first);
   return ids;
 }

@@ -45,10 +45,11 @@ struct ReadOptions {
                                                                       const ReadOptions& options = {});
 
 /// Several sources as one, in order. Channels are matched by name and type and follow the first source's
-/// order; coordinate formats that differ widen to f64. Errors: InvalidArgument (no source; a channel that not
-/// all have, naming file and channel).
+/// order; coordinate formats that differ widen to f64. A channel "alpha" that not all have is left out with a
+/// warning, unless `every_channel`. Errors: InvalidArgument (no source; another channel that not all have,
+/// naming file and channel).
 [[nodiscard]] Result<std::unique_ptr<PointSource>> concatenate(
-    std::vector<std::unique_ptr<PointSource>> sources);
+    std::vector<std::unique_ptr<PointSource>> sources, bool every_channel = false);
 
 struct WriteOptions {
   bool ascii = false;       ///< PCD and PLY as text

@@ -12,6 +12,7 @@ struct PcdHeader {
   std::size_t stride = 0;
   std::uint64_t points = 0;
   Data data = Data::ascii;
+  std::string unkept;  ///< what the header says beyond points and channels, as a sentence; empty if nothing
 };
 
 /// Reads up to and with the DATA line. Errors: Malformed (with line), Empty (no point), Unsupported.

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
 #include <limits>
 
 #include "slam_adapter/formats/pcd.hpp"
@@ -11,7 +12,7 @@ using WordList = std::vector<std::string>;
 
 /// The header's lines as read, before they are checked against each other.
 struct RawHeader {
-  WordList fields, sizes, types, counts;
+  WordList fields, sizes, types, counts, viewpoint;
   std::optional<std::uint64_t> width, height, points;
   std::string data;
 };
@@ -47,7 +48,9 @@ Status read_key(const Cursor& cursor, const std::string& key, const WordList& wo
     return read_count(cursor, key, words, h.points);
   else if (key == "DATA")
     h.data = words.empty() ? "" : words[0];
-  else if (key != "VERSION" && key != "VIEWPOINT")
+  else if (key == "VIEWPOINT")
+    h.viewpoint = words;
+  else if (key != "VERSION")
     return at_line(cursor, quoted(key) + " is no PCD header word");
   return {};
 }
@@ -121,6 +124,27 @@ Result<std::uint64_t> point_count(const RawHeader& raw) {
   return cells;
 }
 
+bool is_identity(const WordList& viewpoint) {
+  constexpr double kIdentity[] = {0, 0, 0, 1, 0, 0, 0};
+  return viewpoint.empty() || std::equal(viewpoint.begin(), viewpoint.end(), std::begin(kIdentity),
+                                         std::end(kIdentity), [](const std::string& word, double wanted) {
+                                           double v = 0;
+                                           return parse_number(std::string_view(word), v) && v == wanted;
+                                         });
+}
+
+std::string unkept(const RawHeader& raw) {
+  const bool grid = raw.width && raw.height.value_or(1) > 1, viewpoint = !is_identity(raw.viewpoint);
+  if (!grid && !viewpoint) return {};
+  std::string r;
+  if (grid) {
+    r = "its grid of " + std::to_string(*raw.width) + " x " + std::to_string(*raw.height) + " points";
+    if (viewpoint) r += " and ";
+  }
+  if (viewpoint) r += "its VIEWPOINT";
+  return r + (grid && viewpoint ? " are not kept" : " is not kept");
+}
+
 }  // namespace
 
 Result<PcdHeader> read_pcd_header(Cursor& cursor) {
@@ -141,6 +165,7 @@ Result<PcdHeader> read_pcd_header(Cursor& cursor) {
   for (std::size_t i = 0; i < n; ++i) MAPCODEC_TRY(add_field(raw, i, h));
   MAPCODEC_ASSIGN(h.points, point_count(raw));
   if (h.points == 0) return make_error(ErrorCode::kEmpty, "holds no point (the PCD header announces 0)");
+  h.unkept = unkept(raw);
   return h;
 }
 

@@ -19,6 +19,9 @@ class PcdReader : public RecordReader {
     cursor_ = body_;
     done_ = 0;
   }
+  [[nodiscard]] std::vector<std::string> warnings() const override {
+    return header_.unkept.empty() ? std::vector<std::string>{} : std::vector{header_.unkept};
+  }
 
  protected:
   PcdHeader header_;

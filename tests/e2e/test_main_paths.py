@@ -3,7 +3,7 @@
 import json
 import unittest
 
-from clouds import FULL, RGB, XYZ, pcd_bytes, positions, read_pcd, room, write
+from clouds import FULL, RGB, XYZ, pcd_bytes, ply_bytes, positions, read_pcd, room, write
 from program import ProgramTest, run
 
 INFO_KEYS = {"format_version", "points", "tiles", "bytes", "bits_per_point", "ratio", "input_bytes", "promise", "achieved",
@@ -126,6 +126,24 @@ class MainPaths(ProgramTest):
         self.assertEqual(info["points"], 8000)
         self.assertGreater(info["bounds"]["max"][0], 20)
 
+    def test_pcd_and_ply_colour_make_one_map(self):
+        pcd = write(self.path("a.pcd"), pcd_bytes(room(2000, RGB)))
+        ply = write(self.path("b.ply"), ply_bytes(room(1000, RGB, seed=7)))
+        for inputs in ((pcd, ply), (ply, pcd)):
+            out = self.succeeds("compress", *inputs, "-o", self.path("both.mapc"), "--force", "--max-error", 0.005)
+            self.assertRegex(out.err, r"fourth byte of its colour \(alpha\) is not kept")
+            info = self.succeeds("info", self.path("both.mapc"), "--json").json
+            self.assertEqual(info["points"], 3000)
+            self.assertEqual([c["name"] for c in info["channels"] if c["kept"] != "dropped"], ["rgb"])
+        self.fails(2, "compress", *inputs, "-o", self.path("exact.mapc"), "--lossless", says="has no channel alpha")
+
+    def test_what_a_pcd_header_loses_is_said(self):
+        head, rest = pcd_bytes(self.cloud).split(b"WIDTH 6000\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\n")
+        data = head + b"WIDTH 100\nHEIGHT 60\nVIEWPOINT 1 2 0 1 0 0 0\n" + rest
+        grid = write(self.path("grid.pcd"), data)
+        out = self.succeeds("compress", grid, "-o", self.path("grid.mapc"))
+        self.assertRegex(out.err, "its grid of 100 x 60 points and its VIEWPOINT are not kept")
+
     def test_channels_choose(self):
         for flag, kept in (("none", []), ("rgb", ["rgb"]), ("ring,intensity", ["intensity", "ring"])):
             archive = self.compress(self.source, "--channels", flag, "--force")
@@ -154,7 +172,7 @@ class MainPaths(ProgramTest):
             self.assertLess(measured["max_axis_error_m"], 0.0035, suffix)
 
     def test_progress_as_json_lines(self):
-        outcome = self.succeeds("compress", self.source, "-o", self.path("p.mapc"), "--progress", "json")
+        outcome = self.succeeds("compress", self.source, "-o", self.path("p.mapc"), "--max-error", 0.01, "--progress", "json")
         for line in outcome.err.splitlines():
             json.loads(line)
 

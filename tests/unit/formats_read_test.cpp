@@ -83,6 +83,25 @@ TEST(PcdRead, NonFiniteAreDroppedAndCounted) {
   EXPECT_EQ(kept.dropped, 0u);
 }
 
+TEST(PcdRead, GridAndViewpointAreSaidNotToBeKept) {
+  const auto warned = [](const std::string& grid, const std::string& viewpoint) {
+    const auto r = read_text("VERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\n" + grid + viewpoint +
+                             "DATA ascii\n1 2 3\n4 5 6\n");
+    EXPECT_TRUE(r.status.ok()) << message(r);
+    EXPECT_LE(r.warnings.size(), 1u);
+    return r.warnings.empty() ? std::string() : r.warnings[0];
+  };
+  EXPECT_EQ(warned("WIDTH 2\nHEIGHT 1\n", ""), "");
+  EXPECT_EQ(warned("WIDTH 2\nHEIGHT 1\n", "VIEWPOINT 0 0 0 1 0 0 0\n"), "");
+  EXPECT_EQ(warned("POINTS 2\n", "VIEWPOINT -0.0 0 0 1.0 0 0 0\n"), "");
+  EXPECT_EQ(warned("WIDTH 1\nHEIGHT 2\n", "VIEWPOINT 0 0 0 1 0 0 0\n"),
+            "cloud: its grid of 1 x 2 points is not kept");
+  EXPECT_EQ(warned("WIDTH 2\nHEIGHT 1\n", "VIEWPOINT 0 0 1.5 1 0 0 0\n"), "cloud: its VIEWPOINT is not kept");
+  EXPECT_EQ(warned("WIDTH 2\nHEIGHT 1\n", "VIEWPOINT 0 0 0\n"), "cloud: its VIEWPOINT is not kept");
+  EXPECT_EQ(warned("WIDTH 1\nHEIGHT 2\n", "VIEWPOINT 0 0 0 0 1 0 0\n"),
+            "cloud: its grid of 1 x 2 points and its VIEWPOINT are not kept");
+}
+
 TEST(PcdRead, Float32FarFromOriginWarns) {
   const auto r = read_text(pcd_xyz(1, "500000 2 3\n"));
   ASSERT_EQ(r.warnings.size(), 1u);
@@ -395,32 +414,61 @@ TEST(ScanFolder, PosesAreApplied) {
   EXPECT_EQ(*detect_format(folder / ""), "3DTK");
 }
 
+std::unique_ptr<PointSource> opened(const std::string& text, const char* name) {
+  return std::move(open_source_memory(
+                       ByteSpan(reinterpret_cast<const std::uint8_t*>(text.data()), text.size()), name))
+      .value();
+}
+ReadBack read_both(const std::string& first, const std::string& second, bool every_channel = false) {
+  std::vector<std::unique_ptr<PointSource>> sources;
+  sources.push_back(opened(first, "first"));
+  sources.push_back(opened(second, "second"));
+  return drain(concatenate(std::move(sources), every_channel));
+}
+
 TEST(Concatenate, MatchesChannelsByName) {
-  const auto open = [](const std::string& text, const char* name) {
-    return std::move(open_source_memory(
-                         ByteSpan(reinterpret_cast<const std::uint8_t*>(text.data()), text.size()), name))
-        .value();
-  };
   const std::string a = pcd("x y z ring t", "4 4 4 1 8", "F F F U F", 1, "ascii", "1 2 3 4 5\n");
   const std::string b = pcd("t x y z ring", "8 8 8 8 1", "F F F F U", 1, "ascii", "50 10 20 30.1 40\n");
   const std::string c = pcd_xyz(1, "7 8 9\n");
-  const auto run = [&](const std::string& first, const std::string& second) {
-    std::vector<std::unique_ptr<PointSource>> sources;
-    sources.push_back(open(first, "first.pcd"));
-    sources.push_back(open(second, "second.pcd"));
-    return drain(concatenate(std::move(sources)));
-  };
-  const auto r = run(a, b);
+  const auto r = read_both(a, b);
   ASSERT_TRUE(r.status.ok()) << message(r);
   ASSERT_EQ(r.cloud.size(), 2u);
   EXPECT_EQ(r.cloud.coordinates.kind, Kind::f64);
   EXPECT_EQ(r.cloud.xyz[1][2], 30.1);
   EXPECT_EQ(r.cloud.find("ring")->get<std::uint8_t>(1), 40);
   EXPECT_EQ(r.cloud.find("t")->get<double>(1), 50);
-  EXPECT_TRUE(fails_with(run(a, c), ErrorCode::kInvalidArgument,
-                         "second.pcd: has no channel ring (u8), which first.pcd has"));
-  EXPECT_TRUE(fails_with(run(c, a), ErrorCode::kInvalidArgument, "first.pcd: has no channel ring"));
+  EXPECT_TRUE(fails_with(read_both(a, c), ErrorCode::kInvalidArgument,
+                         "second: has no channel ring (u8), which first has"));
+  EXPECT_TRUE(fails_with(read_both(c, a), ErrorCode::kInvalidArgument, "first: has no channel ring"));
   EXPECT_FALSE(concatenate({}).ok());
+}
+
+TEST(Concatenate, AlphaThatNotAllHaveIsDroppedAloud) {
+  const std::string with = pcd("x y z rgb", "4 4 4 4", "F F F U", 1, "ascii", "1 2 3 4278321666\n");
+  const std::string without =
+      "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\n"
+      "property uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n4 5 6 7 8 9\n";
+  for (const bool swapped : {false, true}) {
+    const auto r = swapped ? read_both(without, with) : read_both(with, without);
+    ASSERT_TRUE(r.status.ok()) << message(r);
+    ASSERT_EQ(r.cloud.size(), 2u);
+    EXPECT_EQ(r.cloud.channels.size(), 1u);
+    const Channel* rgb = r.cloud.find("rgb");
+    ASSERT_NE(rgb, nullptr);
+    EXPECT_EQ(rgb->get<std::uint8_t>(swapped ? 0 : 1, 2), 9);
+    EXPECT_EQ(rgb->get<std::uint8_t>(swapped ? 1 : 0, 2), 4278321666u & 255);
+    ASSERT_EQ(r.warnings.size(), 1u);
+    EXPECT_NE(r.warnings[0].find(swapped ? "second: the fourth byte" : "first: the fourth byte"),
+              std::string::npos)
+        << r.warnings[0];
+  }
+  EXPECT_TRUE(fails_with(read_both(with, without, true), ErrorCode::kInvalidArgument,
+                         "second: has no channel alpha (u8), which first has"));
+  EXPECT_TRUE(fails_with(read_both(without, with, true), ErrorCode::kInvalidArgument,
+                         "first: has no channel alpha (u8), which second has"));
+  const auto both = read_both(with, with);
+  EXPECT_NE(both.cloud.find("alpha"), nullptr);
+  EXPECT_TRUE(both.warnings.empty());
 }
 
 }  // namespace

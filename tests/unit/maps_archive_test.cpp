@@ -2,10 +2,15 @@
 // What goes in comes out, and how many bytes the container adds.
 #include "tests/unit/maps_support.hpp"
 
+#include <fcntl.h>
+#include <sys/file.h>
+#include <sys/wait.h>
+
 #include <cmath>
 #include <thread>
 
 #include "maps/column_codec.hpp"
+#include "maps/file_store.hpp"
 #include "maps/tile_bounds.hpp"
 
 namespace mapcodec {
@@ -277,6 +282,37 @@ TEST(TileBounds, EdgeCases) {
   const auto point = encode_bounds({{0.5, 0.5, 0.5}, {0.5, 0.5, 0.5}}, {}, {0, 0, 0}, 1);
   ASSERT_TRUE(point);
   EXPECT_TRUE(decode_bounds(*point, {}, {0, 0, 0}, 1).contains({0.5, 0.5, 0.5}));
+}
+
+TEST(MapWriter, RemovesWhatKilledWritersLeft) {
+  TemporaryFolder folder;
+  const pid_t child = ::fork();
+  if (child == 0) ::_exit(0);
+  ASSERT_GT(child, 0);
+  ASSERT_EQ(::waitpid(child, nullptr, 0), child);
+  const std::string gone = std::to_string(child), here = std::to_string(::getpid());
+  const std::string stale[] = {"m.mapc.tmp-" + gone + "-0", "m.mapc.tmp-" + gone + "-17"};
+  const std::string kept[] = {
+      "m.mapc.tmp-" + here + "-99",      // its writer lives
+      "n.mapc.tmp-" + gone + "-0",       // another target
+      "m.mapc.tmp-" + gone + "-0.note",  // not a name that a writer makes
+      "m.mapc.tmp-" + gone,
+      "m.mapc.tmp-0-0",
+      "m.mapc.tmp--1-0",
+      "m.mapc.tmp-99999999999999999999-0",
+      "m.mapc.tmp-" + gone + "-5",  // locked: a writer whose process number means nothing here
+  };
+  for (const std::string& name : stale) write_file(folder.path(name), random_bytes(9, 1));
+  for (const std::string& name : kept) write_file(folder.path(name), random_bytes(9, 2));
+  std::filesystem::create_directory(folder.path("m.mapc.tmp-" + gone + "-6"));
+  const FileHandle other(::open(folder.path(kept[7]).c_str(), O_RDWR));
+  ASSERT_EQ(::flock(other.fd(), LOCK_EX | LOCK_NB), 0);
+  const MapInfo info = sample_info();
+  write_map(folder.path("m.mapc"), info, random_tiles(2, info, 5));
+  EXPECT_TRUE(MapArchive::open(folder.path("m.mapc")).ok());
+  for (const std::string& name : stale) EXPECT_FALSE(std::filesystem::exists(folder.path(name))) << name;
+  for (const std::string& name : kept) EXPECT_TRUE(std::filesystem::exists(folder.path(name))) << name;
+  EXPECT_EQ(folder.files(), std::size(kept) + 2);
 }
 
 }  // namespace

@@ -61,10 +61,16 @@ Result<BenchCloud> load_cloud(const std::string& path) {
 }
 
 bool is_camera_frame(const PointCloud& cloud) {
-  const auto inside = std::count_if(cloud.xyz.begin(), cloud.xyz.end(), [](const Vec3& p) {
-    return p[2] > 0.2 && p[2] < 15 && std::abs(p[0]) < 0.8 * p[2] && std::abs(p[1]) < 0.7 * p[2];
-  });
-  return static_cast<double>(inside) > 0.95 * static_cast<double>(cloud.size());
+  // Some drivers look along z, some against it.
+  std::size_t before = 0, behind = 0;
+  for (const Vec3& p : cloud.xyz) {
+    const double depth = std::abs(p[2]);
+    const bool seen =
+        depth > 0.2 && depth < 15 && std::abs(p[0]) < 0.8 * depth && std::abs(p[1]) < 0.7 * depth;
+    before += seen && p[2] > 0 ? 1U : 0U;
+    behind += seen && p[2] < 0 ? 1U : 0U;
+  }
+  return static_cast<double>(std::max(before, behind)) > 0.95 * static_cast<double>(cloud.size());
 }
 
 }  // namespace mapcodec::bench

@@ -4,6 +4,7 @@
 #include <spawn.h>
 #include <sys/wait.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <sstream>
@@ -19,8 +20,7 @@ std::string quoted(const std::string& text) {
   std::string r = "\"";
   for (const char c : text) {
     if (c == '"' || c == '\\') r += '\\';
-    // Titles are shown as they are: gnuplot would lower what follows an underscore.
-    r += c == '_' ? '-' : c;
+    r += c;
   }
   r += '"';
   return r;
@@ -47,18 +47,51 @@ bool has_data(const Plot& plot, const Series& s) {
   return false;
 }
 
+/// A logarithmic axis that ends at the data, with marks at 1, 2, 5, 10, ...: gnuplot's own would run to the
+/// next powers of ten and mark nothing between.
+void write_log_axis(const Plot& plot, char axis, std::ostream& out) {
+  double low = HUGE_VAL, high = 0;
+  for (const Series& s : plot.series) {
+    for (const auto& [x, y] : s.points) {
+      if (!is_drawable(plot, x, y)) continue;
+      low = std::min(low, axis == 'x' ? x : y);
+      high = std::max(high, axis == 'x' ? x : y);
+    }
+  }
+  if (!(low <= high)) return;
+  constexpr double kRoom = 1.25;
+  out << "set logscale " << axis << "\nset " << axis << "range [" << low / kRoom << ":" << high * kRoom
+      << "]\n";
+  const int first = static_cast<int>(std::floor(std::log10(low))),
+            last = static_cast<int>(std::ceil(std::log10(high)));
+  std::string separator = "set " + std::string(1, axis) + "tics (";
+  for (int e = first; e <= last; ++e) {
+    for (const int digit : {1, 2, 5}) {
+      if (digit > 1 && last - first > 3) continue;
+      out << separator << "\"" << digit * std::pow(10, e) << "\" " << digit << "e" << e;
+      separator = ", ";
+    }
+  }
+  out << ")\n";
+}
+
+// Gnuplot's own include a yellow that hardly shows on white.
+constexpr const char* kColors[] = {"#6a3d9a", "#1b9e77", "#56b4e9", "#e69f00", "#a65628",
+                                   "#0072b2", "#e41a1c", "#000000", "#f781bf"};
+
 void write_command(const Plot& plot, std::size_t number, std::ostream& out) {
-  out << "set title " << quoted(plot.title) << "\nset xlabel " << quoted(plot.x_label) << "\nset ylabel "
-      << quoted(plot.y_label) << "\nunset logscale\n";
-  if (plot.log_x) out << "set logscale x\n";
-  if (plot.log_y) out << "set logscale y\n";
+  out << "set title " << quoted(plot.title) << "\nset xlabel " << quoted(plot.x_label)
+      << " offset 0,0.6\nset ylabel " << quoted(plot.y_label)
+      << "\nunset logscale\nset autoscale\nset xtics auto\nset ytics auto\n";
+  if (plot.log_x) write_log_axis(plot, 'x', out);
+  if (plot.log_y) write_log_axis(plot, 'y', out);
   std::string separator = "plot ";
   for (std::size_t i = 0; i < plot.series.size(); ++i) {
     const Series& s = plot.series[i];
     if (!has_data(plot, s)) continue;
     out << separator << "$p" << number << "s" << i << " using 1:2 with "
-        << (s.line ? "linespoints" : "points") << " lw 2 pt " << i % 13 + 4 << " ps 1.2 title "
-        << quoted(s.title);
+        << (s.line ? "linespoints" : "points") << " lw 2 lc rgb \"" << kColors[i % std::size(kColors)]
+        << "\" pt " << i % 13 + 4 << " ps 1.2 title " << quoted(s.title);
     separator = ", \\\n     ";
   }
   out << "\n";
@@ -66,8 +99,9 @@ void write_command(const Plot& plot, std::size_t number, std::ostream& out) {
 
 std::string script(const std::vector<Plot>& plots, const std::string& png_path) {
   std::ostringstream out;
-  out << "set terminal pngcairo size " << 1000 * plots.size() << ",640 font \"Sans,12\"\nset output "
-      << "\"" << png_path << "\"\nset grid\nset key outside right top vertical\n";
+  out << "set terminal pngcairo noenhanced size " << 800 * plots.size()
+      << ",640 font \"Sans,12\"\nset output "
+      << "\"" << png_path << "\"\nset grid\nset key below horizontal maxrows 4\n";
   for (std::size_t i = 0; i < plots.size(); ++i) write_data(plots[i], i, out);
   out << "set multiplot layout 1," << plots.size() << "\n";
   for (std::size_t i = 0; i < plots.size(); ++i) write_command(plots[i], i, out);
