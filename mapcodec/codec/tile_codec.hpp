@@ -46,13 +46,14 @@ struct TileSettings {
   CodecId codec = CodecId::points;
   Effort effort = Effort::standard;
   bool keep_counts = true;  ///< points: voxels keep how many points they stood for
+  double step_m = 0;        ///< points, surface: this tile's own step (written into it); 0: schema.step_m
   PaperSettings paper;
 };
 
 /// What a tile lost, measured by its encoder on what its decoder will give.
 struct TileErrors {
   double rms_m = 0;             ///< symmetric: the larger direction
-  double max_axis_error_m = 0;  ///< largest error along one axis
+  double max_axis_error_m = 0;  ///< largest error along one axis (surface: a bound for it)
   double color_error = 0;       ///< mean RGB distance, 0..255 scale
   double density_error = 0;     ///< sum |n_dec - n_orig| / N over 10 cm voxels
 };
@@ -65,6 +66,8 @@ struct EncodedTile {
   std::uint64_t geometry_bytes = 0;  ///< of `bytes`, what is not channels
   Box bounds;                        ///< of the decoded points and the original ones
   TileErrors errors;
+  double rms_forward_m = 0;   ///< root mean square distance of the original points to the decoded ones
+  double rms_backward_m = 0;  ///< of the decoded points to the original ones
 };
 
 /// Encodes the points of one tile. Pure: same input, same bytes, on any thread.

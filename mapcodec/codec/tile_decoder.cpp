@@ -6,6 +6,7 @@
 #include "mapcodec/codec/lossless_decoder.hpp"
 #include "mapcodec/codec/paper_decoder.hpp"
 #include "mapcodec/codec/points_decoder.hpp"
+#include "mapcodec/codec/surface_decoder.hpp"
 #include "mapcodec/codec/tile_codec.hpp"
 #include "mapcodec/codec/tile_sections.hpp"
 
@@ -25,7 +26,7 @@ Result<TileHeader> read_header(ByteReader& in, std::uint8_t& flags) {
   flags = in.u8();
   h.points = in.varint();
   MAPCODEC_TRY(in.status("tile header"));
-  if (h.codec < CodecId::lossless || h.codec > CodecId::paper) {
+  if (h.codec < CodecId::lossless || h.codec > CodecId::surface) {
     return make_error(ErrorCode::kUnknownCodec,
                       "tile codec " + std::to_string(int(h.codec)) + " is not known here", 0);
   }
@@ -68,7 +69,12 @@ Result<Geometry> decode_geometry(const Sections& s, const MapSchema& schema, con
   if (!(s.step_m > 0) || !std::isfinite(s.step_m))
     return make_error(ErrorCode::kMalformed, "tile has no voxel size");
   const Quantizer lattice{schema.origin, s.step_m, schema.coordinates.kind};
-  MAPCODEC_ASSIGN(DecodedPoints d, decode_points(s.geometry, s.header.points, lattice, limits));
+  const bool surface = s.header.codec == CodecId::surface;
+  MAPCODEC_ASSIGN(DecodedPoints d, surface ? decode_surface(s.geometry, s.header.points, lattice, limits)
+                                           : decode_points(s.geometry, s.header.points, lattice, limits));
+  if (!s.channels.empty() && d.voxels.size() != d.xyz.size()) {
+    return make_error(ErrorCode::kMalformed, "surface tile has channels but no order for them");
+  }
   return Geometry{std::move(d.xyz), std::move(d.voxels)};
 }
 
@@ -87,6 +93,8 @@ Result<PointCloud> decode_with_channels(const Sections& s, const MapSchema& sche
                         "channel '" + c.info.name + "' would need too much memory");
     }
     const ByteSpan section = c.kept == ChannelKept::constant ? ByteSpan{} : s.channels[next++];
+    // A surface tile without coded channels has no voxels, but a constant needs to know for how many points.
+    if (c.kept == ChannelKept::constant) g.voxels.resize(n);
     MAPCODEC_ASSIGN(Channel values, decode_channel(section, c, g.voxels, limits));
     cloud.channels.push_back(std::move(values));
   }

@@ -8,6 +8,7 @@
 #include "mapcodec/codec/paper_decoder.hpp"
 #include "mapcodec/codec/paper_encoder.hpp"
 #include "mapcodec/codec/points_encoder.hpp"
+#include "mapcodec/codec/surface_tile.hpp"
 #include "mapcodec/codec/tile_codec.hpp"
 #include "mapcodec/codec/tile_color.hpp"
 #include "mapcodec/codec/tile_sections.hpp"
@@ -32,9 +33,14 @@ Channel gather(const Channel& from, const std::vector<std::uint32_t>& order) {
   return to;
 }
 
+/// The step that a tile is coded with.
+double step_of(const MapSchema& schema, const TileSettings& settings) {
+  return settings.step_m > 0 ? settings.step_m : schema.step_m;
+}
+
 Result<Geometry> encode_points_geometry(const PointCloud& tile, const MapSchema& schema,
                                         const TileSettings& settings) {
-  const Quantizer lattice{schema.origin, schema.step_m, schema.coordinates.kind};
+  const Quantizer lattice{schema.origin, step_of(schema, settings), schema.coordinates.kind};
   MAPCODEC_ASSIGN(PointsEncoding e,
                   encode_points(tile.xyz, lattice, {settings.effort, settings.keep_counts}));
   Geometry g{std::move(e.bytes), std::move(e.order), std::move(e.voxels), std::move(e.decoded), {}};
@@ -71,10 +77,14 @@ Box bounds_of(const std::vector<Vec3>& points) {
   return b;
 }
 
-EncodedTile begin_tile(const PointCloud& tile, CodecId codec, std::uint64_t points, ByteWriter& out) {
+/// @param step_m  of a codec with steps, 0 of others.
+EncodedTile begin_tile(const PointCloud& tile, const MapSchema& schema, CodecId codec, std::uint64_t points,
+                       double step_m, ByteWriter& out) {
+  const bool own_step = step_m > 0 && step_m != schema.step_m;
   out.u8(static_cast<std::uint8_t>(codec));
-  out.u8(0);
+  out.u8(own_step ? kTileFlagOwnStep : 0);
   out.varint(points);
+  if (own_step) out.f64(step_m);
   EncodedTile r;
   r.codec = codec;
   r.points = points;
@@ -93,7 +103,8 @@ Result<EncodedTile> encode_with_channels(const PointCloud& tile, const MapSchema
                                   ? encode_lossless_geometry(tile, schema, settings.effort)
                                   : encode_points_geometry(tile, schema, settings));
   ByteWriter out;
-  EncodedTile r = begin_tile(tile, settings.codec, g.order.size(), out);
+  const double step_m = settings.codec == CodecId::points ? step_of(schema, settings) : 0;
+  EncodedTile r = begin_tile(tile, schema, settings.codec, g.order.size(), step_m, out);
   const std::vector<std::size_t> coded = coded_channels(schema, settings.codec);
   append_section(out, g.bytes, coded.empty());
   r.geometry_bytes = out.size();
@@ -109,6 +120,24 @@ Result<EncodedTile> encode_with_channels(const PointCloud& tile, const MapSchema
   }
   r.bounds.add(bounds_of(g.decoded));
   r.errors = g.errors;
+  r.rms_forward_m = r.rms_backward_m = g.errors.rms_m;
+  r.bytes = out.take();
+  return r;
+}
+
+Result<EncodedTile> encode_by_surfaces(const PointCloud& tile, const MapSchema& schema,
+                                       const TileSettings& settings) {
+  const double step_m = step_of(schema, settings);
+  MAPCODEC_ASSIGN(const SurfaceTile t, encode_surface_tile(tile, schema, step_m, settings.effort));
+  ByteWriter out;
+  EncodedTile r = begin_tile(tile, schema, CodecId::surface, tile.size(), step_m, out);
+  append_section(out, t.geometry, t.channels.empty());
+  r.geometry_bytes = out.size();
+  for (const Bytes& section : t.channels) append_section(out, section, &section == &t.channels.back());
+  r.bounds.add(t.bounds);
+  r.errors = t.errors;
+  r.rms_forward_m = t.rms_forward_m;
+  r.rms_backward_m = t.rms_backward_m;
   r.bytes = out.take();
   return r;
 }
@@ -118,13 +147,14 @@ Result<EncodedTile> encode_paper_tile(const PointCloud& tile, const MapSchema& s
                                       const TileSettings& settings) {
   MAPCODEC_ASSIGN(PaperEncoding e, encode_paper(tile, schema, settings.paper));
   ByteWriter out;
-  EncodedTile r = begin_tile(tile, CodecId::paper, e.points, out);
+  EncodedTile r = begin_tile(tile, schema, CodecId::paper, e.points, 0, out);
   out.raw(e.bytes);
   r.geometry_bytes = e.geometry_bytes;
   r.bytes = out.take();
   // Resampled points must be looked at to know what was lost.
   MAPCODEC_ASSIGN(const PointCloud decoded, decode_tile(r.bytes, schema));
   r.errors = measure_tile(tile, decoded);
+  r.rms_forward_m = r.rms_backward_m = r.errors.rms_m;
   r.bounds.add(decoded.bounds());
   return r;
 }
@@ -144,8 +174,9 @@ Status check_input(const PointCloud& tile, const MapSchema& schema, const TileSe
   if (tile.channels.size() != schema.channels.size()) {
     return make_error(ErrorCode::kInvalidArgument, "the points' channels are not the schema's");
   }
-  if (settings.codec == CodecId::points && !(schema.step_m > 0)) {
-    return make_error(ErrorCode::kInvalidArgument, "the voxel size must be positive");
+  const bool has_step = settings.codec == CodecId::points || settings.codec == CodecId::surface;
+  if (has_step && !(step_of(schema, settings) > 0)) {
+    return make_error(ErrorCode::kInvalidArgument, "the step must be positive");
   }
   return {};
 }
@@ -161,6 +192,8 @@ Result<EncodedTile> encode_tile(const PointCloud& tile, const MapSchema& schema,
       return encode_with_channels(tile, schema, settings);
     case CodecId::paper:
       return encode_paper_tile(tile, schema, settings);
+    case CodecId::surface:
+      return encode_by_surfaces(tile, schema, settings);
     default:
       return make_error(ErrorCode::kUnknownCodec,
                         std::string("no encoder for codec ") + codec_name(settings.codec));

@@ -12,6 +12,7 @@
 #include "mapcodec/attribute/channel_encoder.hpp"
 #include "mapcodec/codec/lossless_encoder.hpp"
 #include "mapcodec/codec/points_encoder.hpp"
+#include "mapcodec/codec/surface_encoder.hpp"
 #include "mapcodec/geometry/morton.hpp"
 #include "maps/map_writer.hpp"
 #include "tests/fuzz/seeds.hpp"
@@ -43,6 +44,20 @@ void points_seeds(SeedFolder& folder) {
       Bytes seed{std::uint8_t(count), std::uint8_t(count >> 8), 0};
       seed.insert(seed.end(), encoded->bytes.begin(), encoded->bytes.end());
       folder.write("points", seed);
+    }
+  }
+}
+
+/// Bytes 0 and 1: number of points; byte 2: levels, 0 for all (surface_fuzz.cpp).
+void surface_seeds(SeedFolder& folder) {
+  for (const std::size_t count : {1u, 20u, 1000u, 5000u}) {
+    for (const double step : {0.002, 0.02, 0.2}) {
+      auto encoded = encode_surface(corner(count), Quantizer{{0, 0, 0}, step, CoordinateFormat::Kind::f32}, {});
+      if (!encoded.ok()) continue;
+      if (count > 20) (void)set_voxels(*encoded, surface::least_voxel_shift(encoded->header.depth));
+      Bytes seed{std::uint8_t(count), std::uint8_t(count >> 8), std::uint8_t(count == 5000 ? 20 : 0)};
+      seed.insert(seed.end(), encoded->bytes.begin(), encoded->bytes.end());
+      folder.write("surface", seed);
     }
   }
 }
@@ -111,6 +126,7 @@ int main(int argc, char** argv) {
   if (argc != 2) return 2;
   mapcodec::fuzz::SeedFolder folder(argv[1]);
   mapcodec::fuzz::points_seeds(folder);
+  mapcodec::fuzz::surface_seeds(folder);
   mapcodec::fuzz::channel_seeds(folder);
   mapcodec::fuzz::lossless_seeds(folder);
   mapcodec::fuzz::archive_seed(folder, 1, 1);

@@ -6,9 +6,9 @@ Usage: read_tile.py MAP.mapc... [--expect HASHES.json]
 Prints, for each tile of the last revision, its codec, number of points and the SHA-256 of its coordinates (float64,
 little-endian, x y z, in decoded order), then the hash of all points with all channels in any order (as
 mapcodec/quality/multiset_hash.hpp). With --expect: exit code 1 unless the file says the same, under each map's name.
-Reads `lossless` and `points` tiles with all their channels. It does not read `paper` tiles (section 7).
-read_archive.py reads the archive around the tiles; sections 4, 5, 6 and 8 are in tile_entropy.py, tile_geometry.py and
-tile_channels.py. Standard library only, but for what read_archive.py needs.
+Reads `lossless`, `points` and `surface` tiles with all their channels. It does not read `paper` tiles (section 7).
+read_archive.py reads the archive around the tiles; sections 4, 5, 6, 8 and 10 are in tile_entropy.py, tile_geometry.py,
+tile_channels.py and tile_surface.py. Standard library only, but for what read_archive.py needs.
 """
 import argparse
 import hashlib
@@ -21,8 +21,9 @@ from read_archive import Damaged, Reader, check_header, read_revisions
 from tile_channels import SCALAR_SIZE, read_channel
 from tile_entropy import M64
 from tile_geometry import read_lossless, read_points
+from tile_surface import read_surface
 
-CODEC = {1: "lossless", 2: "points", 3: "paper"}
+CODEC = {1: "lossless", 2: "points", 3: "paper", 4: "surface"}
 EXACT, BOUNDED, CONSTANT, DROPPED = 1, 2, 3, 4
 FLOAT32, FLOAT64, FIXED = 1, 2, 3
 
@@ -53,12 +54,14 @@ def read_tile(payload, schema):
     r = Reader(payload)
     codec, flags, count = r.uint(1), r.uint(1), r.varint()
     step = r.f64() if flags & 1 else schema["step"]
-    if codec not in (1, 2) or flags > 1:
+    if codec not in (1, 2, 4) or flags > 1:
         raise Damaged(f"no reader for codec {codec}, flags {flags}")
     coded = [c for c in schema["channels"] if c["kept"] in (EXACT, BOUNDED)]
     sections = [r.sized() for _ in coded] + [r.raw(r.left())]
     if codec == 1:
         xyz, voxels = read_lossless(sections[0], count, schema)
+    elif codec == 4:
+        xyz, voxels = read_surface(sections[0], count, schema, step)
     else:
         xyz, voxels = read_points(sections[0], count, schema, step)
     channels = {c["name"]: read_channel(s, c, voxels) for c, s in zip(coded, sections[1:])}

@@ -1,0 +1,189 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "mapcodec/codec/surface_errors.hpp"
+
+#include <cmath>
+
+namespace mapcodec::surface {
+namespace {
+
+constexpr double kCoveredSteps2 = 0.15;  // a place so near to a point [steps^2] is covered
+constexpr double kFilled = 0.32;  // mean squared distance of points in a volume, each alone in a share of 1
+
+double cosine(unsigned sixteenth) {
+  static constexpr double kTable[16] = {
+      1,  0.92387953,  0.70710678,  0.38268343,  0, -0.38268343, -0.70710678, -0.92387953,
+      -1, -0.92387953, -0.70710678, -0.38268343, 0, 0.38268343,  0.70710678,  0.92387953};
+  return kTable[sixteenth % 16];
+}
+
+/// How far points reach in each of sixteen directions, in halves of the cell's sides.
+std::array<double, 16> reach_of(std::span<const Units> points, const TreeCell& cell, unsigned u, unsigned v) {
+  const Units c = cell.twice_center();
+  const double scale_u = 2.0 / double(1u << cell.shape[u]), scale_v = 2.0 / double(1u << cell.shape[v]);
+  std::array<double, 16> reach;
+  reach.fill(-10);
+  const std::size_t stride = 1 + cell.count() / 256;
+  for (std::size_t i = cell.begin; i < cell.end; i += stride) {
+    const double x = (points[i][u] + 0.5 - 0.5 * c[u]) * scale_u,
+                 y = (points[i][v] + 0.5 - 0.5 * c[v]) * scale_v;
+    for (unsigned a = 0; a < 16; ++a) reach[a] = std::max(reach[a], x * cosine(a) + y * cosine(a + 12));
+  }
+  return reach;
+}
+
+}  // namespace
+
+LeafErrors::Place LeafErrors::place(const TreeCell& cell, const Plane& plane, const Vertex& x) {
+  Place r;
+  const Units c = cell.twice_center();
+  const unsigned k = plane.axis, u = (k + 1) % 3, v = (k + 2) % 3;
+  r[u] = 0.5 * c[u] + x.u * (double(1u << cell.shape[u]) / (2.0 * kHalf));
+  r[v] = 0.5 * c[v] + x.v * (double(1u << cell.shape[v]) / (2.0 * kHalf));
+  r[k] = 0.5 * c[k] + double(height_at(plane, cell.shape, x)) / (1 << kHeightBits);
+  return r;
+}
+
+double LeafErrors::squared(const Place& a, const Units& b) {
+  double s = 0;
+  for (unsigned d = 0; d < 3; ++d) s += (a[d] - b[d] - 0.5) * (a[d] - b[d] - 0.5);
+  return s;
+}
+
+LeafError LeafErrors::at_center(const TreeCell& cell, const Moments& m) const {
+  LeafError e;
+  e.forth = e.back = m.second[0] + m.second[1] + m.second[2];
+  if (cell.count() > 1) {
+    const Units c = cell.twice_center();
+    const Place center{0.5 * c[0], 0.5 * c[1], 0.5 * c[2]};
+    double least = kNever;
+    for (std::size_t i = cell.begin; i < cell.end; i += 1 + cell.count() / 8)
+      least = std::min(least, squared(center, points_[i]));
+    e.back = least * cell.count();
+  }
+  e.beside_forth = e.forth;
+  e.beside_back = e.back;
+  return e;
+}
+
+double LeafErrors::of_single(const TreeCell& cell, const Plane* plane) {
+  const Units c = cell.twice_center();
+  Place at{0.5 * c[0], 0.5 * c[1], 0.5 * c[2]};
+  if (plane != nullptr) {
+    const Polygon polygon = polygon_of(*plane, cell.shape);
+    if (polygon.rectangle) {
+      at[plane->axis] += double(plane->h) / (1 << kHeightBits);
+    } else if (polygon.size >= 3) {
+      vertices_.clear();
+      spread(polygon, *plane, cell.shape, 1, vertices_);
+      at = place(cell, *plane, vertices_[0]);
+    }
+  }
+  return squared(at, points_[cell.begin]);
+}
+
+LeafError LeafErrors::of_few(const TreeCell& cell, const Plane& plane, const Polygon& polygon,
+                             std::uint8_t noise) {
+  const std::uint32_t n = cell.count();
+  vertices_.clear();
+  spread(polygon, plane, cell.shape, n, vertices_);
+  std::array<double, kFew> near;
+  std::array<Place, kFew> places;
+  for (std::uint32_t i = 0; i < n; ++i) {
+    near[i] = kNever;
+    places[i] = place(cell, plane, vertices_[i]);
+    places[i][plane.axis] += double(noise_offset(noise, i)) / (1 << kHeightBits);
+  }
+  LeafError e{0, 0, 0, 0};
+  for (std::size_t j = cell.begin; j < cell.end; ++j) {
+    double least = kNever;
+    for (std::uint32_t i = 0; i < n; ++i) {
+      const double s = squared(places[i], points_[j]);
+      least = std::min(least, s);
+      near[i] = std::min(near[i], s);
+    }
+    e.forth += least;
+  }
+  for (std::uint32_t i = 0; i < n; ++i) e.back += near[i];
+  e.beside_forth = e.forth;
+  e.beside_back = e.back;
+  return e;
+}
+
+LeafError LeafErrors::of_many(const TreeCell& cell, const Plane& plane, const Polygon& polygon, double beside,
+                              double missed, std::uint8_t noise, double roughness, double lambda) const {
+  // n points, each alone in its share of the area, about a square: the mean squared distance in it is a
+  // sixth.
+  const double area = area_of(cell.shape, plane, polygon);
+  const double in_plane = area / 6;
+  double forth = beside, back = kBackShare * beside;
+  if (noise != 0) thicken(cell.count(), area, beside, noise, roughness, forth, back);
+  // Dividing lowers what lies beside the surface and what is missed; the positions on it only where they are
+  // worth bits.
+  const double on_it = std::max(0.0, in_plane - 0.5 * lambda * cell.count());
+  return {forth + in_plane, in_plane + missed + back, forth + on_it, missed + back + on_it};
+}
+
+double LeafErrors::missed(const TreeCell& cell, const Plane& plane, const Polygon& polygon,
+                          std::uint32_t probes) {
+  const std::uint32_t n = cell.count();
+  const double covered = area_of(cell.shape, plane, polygon) / n + kStep2 * kCoveredSteps2;
+  vertices_.clear();
+  spread(polygon, plane, cell.shape, probes, vertices_);
+  double sum = 0;
+  for (const Vertex& x : vertices_) sum += coverage_.squared_distance(place(cell, plane, x), covered);
+  return sum * n / double(vertices_.size());
+}
+
+double LeafErrors::roughness(const TreeCell& cell, const Plane& plane, double mean_squared) const {
+  const Slopes slopes = slopes_of(plane, cell.shape);
+  const unsigned k = plane.axis, u = (k + 1) % 3, v = (k + 2) % 3;
+  double sum = 0, count = 0;
+  const std::size_t stride = 1 + cell.count() / 64;
+  for (std::size_t i = cell.begin; i + 1 < cell.end; i += stride, ++count) {
+    const Units &p = points_[i], &q = points_[i + 1];
+    const double h = (p[k] - q[k]) - slopes.a * (p[u] - q[u]) - slopes.b * (p[v] - q[v]);
+    sum += h * h;
+  }
+  return std::min(1.0, sum / std::max(1.0, count) / slopes.stretch_squared() / (2 * mean_squared));
+}
+
+bool LeafErrors::find_wedge(const TreeCell& cell, const Plane& plane, const Polygon& polygon,
+                            Wedge& wedge) const {
+  const std::array<double, 16> reach = reach_of(points_, cell, (plane.axis + 1u) % 3, (plane.axis + 2u) % 3);
+  const std::int64_t whole = twice_area(polygon);
+  std::int64_t least = whole - whole / 16;
+  bool found = false;
+  for (unsigned a = 0; a < 16; ++a) {
+    const double most = std::abs(cosine(a)) + std::abs(cosine(a + 12));
+    const int offset = static_cast<int>(std::ceil(reach[a] / most * 16 - 0.25)) + 15;
+    if (offset >= 31 || offset < 0) continue;
+    const Wedge w{static_cast<std::uint8_t>(a), static_cast<std::uint8_t>(offset)};
+    Polygon p = polygon;
+    cut(p, w);
+    if (p.size < 3 || twice_area(p) >= least) continue;
+    least = twice_area(p);
+    wedge = w;
+    found = true;
+  }
+  return found;
+}
+
+// The originals fill the slab as well only where the heights of neighbours have nothing in common; where they
+// have, the slab comes near them, but its points are far from any.
+void thicken(double n, double area, double beside, std::uint8_t noise, double roughness, double& forth,
+             double& back) {
+  const double thick = 2.0 * (4 << noise), own = std::sqrt(12 * beside / n);
+  const double filled = kFilled * std::pow(area * std::max(std::min(thick, own), 1.0) / n, 2.0 / 3.0);
+  const double slab = n * (std::max(0.0, filled - area / n / 6) + (thick - own) * (thick - own) / 24);
+  forth = slab + (1 - std::min(1.0, 3 * roughness)) * beside;
+  back = slab + (1 - roughness) * (beside + n * thick * thick / 12);
+}
+
+double area_of(const CellShape& shape, const Plane& plane, const Polygon& polygon) {
+  const double scale_u = double(1u << shape[(plane.axis + 1u) % 3]) / (2.0 * kHalf);
+  const double scale_v = double(1u << shape[(plane.axis + 2u) % 3]) / (2.0 * kHalf);
+  return 0.5 * double(twice_area(polygon)) * scale_u * scale_v *
+         std::sqrt(slopes_of(plane, shape).stretch_squared());
+}
+
+}  // namespace mapcodec::surface

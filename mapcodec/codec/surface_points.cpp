@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "mapcodec/codec/surface_points.hpp"
+
+namespace mapcodec::surface {
+namespace {
+
+SubUnits center_of(const Leaf& leaf) {
+  SubUnits c;
+  for (unsigned d = 0; d < 3; ++d) {
+    c[d] = static_cast<std::int32_t>((std::int64_t{leaf.at[d]} << kSubUnitBits) +
+                                     (std::int64_t{1} << (leaf.shape[d] + kSubUnitBits - 1)));
+  }
+  return c;
+}
+
+}  // namespace
+
+void append_points(const Leaf& leaf, std::vector<Vertex>& scratch, std::vector<SubUnits>& out) {
+  const SubUnits center = center_of(leaf);
+  Polygon polygon;
+  if (leaf.has_plane) polygon = polygon_of(leaf.plane, leaf.shape);
+  if (polygon.size >= 3 && leaf.wedged) cut(polygon, leaf.wedge);
+  if (polygon.size < 3) {
+    out.insert(out.end(), leaf.count, center);
+    return;
+  }
+  scratch.clear();
+  spread(polygon, leaf.plane, leaf.shape, leaf.count, scratch);
+  const unsigned k = leaf.plane.axis, u = (k + 1) % 3, v = (k + 2) % 3;
+  constexpr int kDown = kVertexBits + 1 - kSubUnitBits;
+  for (std::size_t i = 0; i < scratch.size(); ++i) {
+    const Vertex& x = scratch[i];
+    const std::int64_t height = height_at(leaf.plane, leaf.shape, x) + noise_offset(leaf.noise, i);
+    SubUnits p = center;
+    p[u] += static_cast<std::int32_t>(((std::int64_t{x.u} << leaf.shape[u]) + (1 << (kDown - 1))) >> kDown);
+    p[v] += static_cast<std::int32_t>(((std::int64_t{x.v} << leaf.shape[v]) + (1 << (kDown - 1))) >> kDown);
+    p[k] += static_cast<std::int32_t>((height + (1 << (kHeightBits - kSubUnitBits - 1))) >>
+                                      (kHeightBits - kSubUnitBits));
+    out.push_back(p);
+  }
+}
+
+}  // namespace mapcodec::surface

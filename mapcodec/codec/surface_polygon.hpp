@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The piece of a plane inside a cell, and points spread over it (FORMAT.md 10.5).
+#pragma once
+
+#include <vector>
+
+#include "mapcodec/codec/surface_plane.hpp"
+
+namespace mapcodec::surface {
+
+/// Corner in a cell's own coordinates: 32768 = half a side.
+struct Vertex {
+  std::int32_t u, v;
+};
+inline constexpr int kVertexBits = 15;
+inline constexpr std::int32_t kHalf = 1 << kVertexBits;
+
+/// Convex, at most twelve corners, counter-clockwise.
+struct Polygon {
+  std::array<Vertex, 12> at;
+  int size = 0;
+  bool rectangle = false;  ///< corners at (u0, v0), (u1, v0), (u1, v1), (u0, v1)
+};
+
+/// A line that cuts a leaf's polygon: what lies beyond it holds no point.
+struct Wedge {
+  std::uint8_t angle = 0;   ///< 0..15: sixteenths of a turn
+  std::uint8_t offset = 0;  ///< 0..31
+};
+
+/// Keeps where c + (gu u + gv v) / 32768 <= 0.
+void clip(Polygon& polygon, std::int64_t c, std::int64_t gu, std::int64_t gv);
+
+/// The plane inside its cell; no corner if it misses the cell.
+[[nodiscard]] Polygon polygon_of(const Plane& plane, const CellShape& shape);
+void cut(Polygon& polygon, const Wedge& wedge);
+
+/// Twice the area in vertex units.
+[[nodiscard]] std::int64_t twice_area(const Polygon& polygon);
+
+/// Share (0..256) of the plane's polygon in the lower half of the cell along `split_axis`.
+[[nodiscard]] int lower_share(const Plane& plane, const CellShape& shape, unsigned split_axis);
+
+/// `count` points evenly over the polygon: it is cut across its longer side into pieces of areas as count/2
+/// rounded down to the rest, again and again; each last piece gives its centroid. Appends to `out`.
+void spread(const Polygon& polygon, const Plane& plane, const CellShape& shape, std::uint32_t count,
+            std::vector<Vertex>& out);
+
+/// Height of the plane over a vertex, kept inside the cell.
+[[nodiscard]] inline std::int64_t height_at(const Plane& p, const CellShape& shape, const Vertex& x) {
+  const std::int64_t half = half_side(shape[p.axis]);
+  const std::int64_t z = p.h + ((std::int64_t{p.a} * x.u + std::int64_t{p.b} * x.v) >> kVertexBits);
+  return z > half ? half : (z < -half ? -half : z);
+}
+
+/// How far [heights] a leaf's i-th point lies from its plane, where the leaf is `noise` thick: 0 not at all,
+/// else evenly over +-2^(noise + 2) units, so that points side by side are far from each other.
+[[nodiscard]] constexpr std::int64_t noise_offset(std::uint8_t noise, std::size_t i) {
+  if (noise == 0) return 0;
+  std::int64_t reversed = 0;
+  for (int bit = 0; bit < 8; ++bit) reversed |= static_cast<std::int64_t>((i >> bit) & 1) << (7 - bit);
+  return ((2 * reversed - 255) << (noise + 2 + kHeightBits)) >> 8;
+}
+inline constexpr std::uint8_t kMostNoise = 4;
+
+}  // namespace mapcodec::surface

@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What the symbols of a surface tree are expected to cost. Encoder only.
+#pragma once
+
+#include "mapcodec/codec/surface_cell.hpp"
+#include "mapcodec/codec/surface_model.hpp"
+#include "mapcodec/codec/surface_walk.hpp"
+
+namespace mapcodec::surface {
+
+/// A "side" of the code that only counts what symbols would cost [bits].
+class CostMeter {
+ public:
+  bool bit(bool v, const BitModel& m) {
+    const std::uint32_t p = v ? m.probability() : 65536 - m.probability();
+    bits_ += kCost[p >> 6];
+    return v;
+  }
+  std::uint64_t raw(std::uint64_t v, int count) {
+    bits_ += count;
+    return v;
+  }
+  [[nodiscard]] double bits() const { return bits_; }
+
+ private:
+  static const std::array<float, 1025> kCost;
+  double bits_ = 0;
+};
+
+/// What a cell's plane is to it.
+enum class PlaneState : int { none = 0, inherited = 1, own = 2 };
+
+/// Prices [bits] by the models as they are, in the contexts that are most likely: neighbours are not known
+/// yet.
+class Prices {
+ public:
+  explicit Prices(Models& models) : models_(models) {}
+
+  [[nodiscard]] static CellContext context(const TreeCell& cell) {
+    CellContext c;
+    c.size = size_of(cell.shape);
+    c.crowd = crowd_of(cell.count());
+    c.neighbors = 2;
+    c.below = c.above = 1;
+    return c;
+  }
+  [[nodiscard]] bool can_be_block(const TreeCell& cell) const {
+    return models_.voxel_bits > 0 && cell.count() >= kLeastInBlock &&
+           block_levels(cell.shape, models_.voxel_bits) > 0;
+  }
+  [[nodiscard]] int voxel_bits() const { return models_.voxel_bits; }
+
+  [[nodiscard]] double no_plane(const CellContext& c, bool inherits) const;
+  [[nodiscard]] double plane(const CellContext& c, const Plane& own, const Plane* inherited,
+                             const CellShape& shape) const;
+  /// Of the flags that make a cell a leaf.
+  [[nodiscard]] double leaf(const TreeCell& cell, const CellContext& c, PlaneState plane,
+                            bool block = false) const;
+  [[nodiscard]] double wedge(const CellContext& c, const Wedge* line) const;
+  [[nodiscard]] double noise(const CellContext& c, std::uint8_t v, bool voxels) const;
+  /// Of dividing a cell: the flag, which halves hold points, and how many.
+  [[nodiscard]] double division(const TreeCell& cell, const CellContext& c, PlaneState state,
+                                const Plane* plane, int halves, std::uint32_t lower) const;
+  /// Of one division inside a block.
+  [[nodiscard]] double block_division(const TreeCell& cell, const Plane* plane, int halves) const;
+
+ private:
+  Models& models_;
+};
+
+}  // namespace mapcodec::surface
