@@ -10,6 +10,7 @@
 #include "mapcodec/codec/tile_codec.hpp"
 #include "maps/map_archive.hpp"
 #include "parallel/progress.hpp"
+#include "slam_adapter/coding_plan.hpp"
 
 namespace mapcodec {
 
@@ -18,9 +19,11 @@ struct CompressOptions {
   double promise_m = 0.01;                      ///< rms or max_error [m]
   std::optional<double> target_bits_per_point;  ///< find the promise (rms) that gives this size
   std::optional<double> target_ratio;           ///< the same, as archive bytes / raw bytes
-  double color_error = 10;                      ///< mean RGB distance allowed, 0..255; 0 = exact
-  std::vector<std::string> channels{"all"};     ///< "all", "none" or names
-  double tile_size_m = 0;                       ///< 0: from the density, about 100,000 points a tile
+  CodecChoice codecs =
+      CodecChoice::cheapest;  ///< of an rms promise: for each tile the cheapest, or one for all
+  double color_error = 10;    ///< mean RGB distance allowed, 0..255; 0 = exact
+  std::vector<std::string> channels{"all"};  ///< "all", "none" or names
+  double tile_size_m = 0;  ///< 0: from the density, 100,000 points a tile, 600,000 of surfaces
   Effort effort = Effort::standard;
   bool keep_order = false;  ///< lossless: also the order of points
   bool keep_counts = true;  ///< false: points in one voxel become one
@@ -38,7 +41,8 @@ struct CompressOptions {
 struct CompressReport {
   std::uint64_t points = 0, dropped_points = 0;
   double seconds = 0;  ///< wall time of everything
-  double survey_seconds = 0, tiling_seconds = 0, tiles_seconds = 0, commit_seconds = 0;
+  double survey_seconds = 0, tiling_seconds = 0, search_seconds = 0, tiles_seconds = 0, commit_seconds = 0;
+  int codings = 0;                   ///< of the whole map, until the promise was met
   std::uint64_t geometry_bytes = 0;  ///< of the tiles, without channels
   std::vector<double> tile_seconds;  ///< encoding time of each tile on its core, in Morton order
   int threads = 0;

@@ -1,64 +1,45 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "slam_adapter/rate_search.hpp"
 
+#include <algorithm>
 #include <functional>
 
 #include "mapcodec/codec/points_encoder.hpp"
 #include "mapcodec/codec/tile_color.hpp"
+#include "mapcodec/geometry/quantizer.hpp"
 #include "parallel/runner.hpp"
+#include "slam_adapter/log_secant.hpp"
 
 namespace mapcodec {
 namespace {
 
-constexpr std::size_t kSampleTiles = 4;
-constexpr double kFinest = 1.0 / (1 << 20);  // of a tile's side
-constexpr double kCoarsest = 0.5;
+constexpr int kMostTries = 12;
+constexpr std::size_t kFewPoints = 60000;                         // for the first tries
+constexpr double kRmsAim = 0.985;                                 // of the promise
+constexpr double kCloseEnough = 0.06, kCloseEnoughOnAll = 0.015;  // of the target; the rest is extrapolated
+constexpr double kLongestLeap =
+    1.1;  // of the step's logarithm: what is far away is not as the slope here says
+constexpr double kFinest = 1.0 / (1 << 20);  // of the longest side of a piece
+constexpr double kBitsPerStep =
+    1.2;  // by how much the logarithm of the size falls with that of the step, usually
 
-Result<std::vector<PointCloud>> sample_tiles(const TileSet& tiles) {
-  std::vector<PointCloud> sample;
-  const std::size_t count = tiles.tiles().size();
-  const std::size_t take = std::min(count, kSampleTiles);
-  for (std::size_t i = 0; i < take; ++i) {
-    MAPCODEC_ASSIGN(PointCloud cloud, tiles.load(i * count / take));
-    sample.push_back(std::move(cloud));
-  }
-  return sample;
-}
-
-/// Mean over the sample's points of what `measure` gives for a tile (per point), measured in parallel.
-Result<double> mean_over(const std::vector<PointCloud>& sample, Arena& arena,
+/// Mean over the sample's points of what `measure` gives for a piece (per point), measured in parallel.
+Result<double> mean_over(const TileSample& sample, Arena& arena,
                          const std::function<Result<double>(const PointCloud&)>& measure) {
-  std::vector<std::optional<Error>> errors(sample.size());
-  std::vector<double> values(sample.size());
-  TbbRunner(arena).run(sample.size(), [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) {
-      const auto value = measure(sample[i]);
-      if (value.ok()) {
-        values[i] = *value;
-      } else {
-        errors[i] = value.error();
-      }
-    }
+  std::vector<std::optional<Result<double>>> values(sample.pieces.size());
+  TbbRunner(arena).run(values.size(), [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) values[i] = measure(sample.pieces[i]);
   });
   double total = 0, points = 0;
-  for (std::size_t i = 0; i < sample.size(); ++i) {
-    if (errors[i]) return *errors[i];
-    total += values[i] * double(sample[i].size());
-    points += double(sample[i].size());
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    if (!values[i]->ok()) return values[i]->error();
+    total += **values[i] * double(sample.pieces[i].size());
+    points += double(sample.pieces[i].size());
   }
   return total / points;
 }
 
-Result<double> bits_at(double step_m, const std::vector<PointCloud>& sample, MapSchema schema,
-                       const TileSettings& settings, Arena& arena) {
-  schema.step_m = step_m;
-  return mean_over(sample, arena, [&](const PointCloud& cloud) -> Result<double> {
-    MAPCODEC_ASSIGN(const EncodedTile tile, encode_tile(cloud, schema, settings));
-    return 8.0 * double(tile.bytes.size()) / double(cloud.size());
-  });
-}
-
-Result<double> color_floor_at(double step_m, std::size_t channel, const std::vector<PointCloud>& sample,
+Result<double> color_floor_at(double step_m, std::size_t channel, const TileSample& sample,
                               const MapSchema& schema, Arena& arena) {
   const Quantizer lattice{schema.origin, step_m, schema.coordinates.kind};
   return mean_over(sample, arena, [&](const PointCloud& cloud) -> Result<double> {
@@ -74,35 +55,72 @@ Result<double> color_floor_at(double step_m, std::size_t channel, const std::vec
 
 }  // namespace
 
-Result<double> find_step_for_bits(double bits_per_point, const TileSet& tiles, const MapSchema& schema,
-                                  const TileSettings& settings, Arena& arena, const std::atomic<bool>* stop) {
-  MAPCODEC_ASSIGN(const std::vector<PointCloud> sample, sample_tiles(tiles));
-  double side = 0;
-  for (const PointCloud& cloud : sample) {
-    const Box b = cloud.bounds();
-    for (std::size_t d = 0; d < 3; ++d) side = std::max(side, b.max[d] - b.min[d]);
+Result<CodedSum> RateSearch::measure(const CodingPlan& plan) const {
+  return encode_sample(sample_, positions_alone(schema_), plan, arena_, stop_);
+}
+
+Status RateSearch::seek_on(const TileSample& sample, CodingPlan& plan, const MapSchema& schema, Value value,
+                           double target, const Range& steps, double& slope) {
+  LogSecant secant(target, slope);
+  // A small map is its own sample: being close there is being close.
+  const double close = sample.whole ? kCloseEnoughOnAll : kCloseEnough;
+  for (int i = 0; i < kMostTries; ++i) {
+    MAPCODEC_ASSIGN(found_, encode_sample(sample, schema, plan, arena_, stop_));
+    const double got = (found_.*value)();
+    const double next = std::clamp(secant.next(plan.step_m, got), steps.finest, steps.coarsest);
+    slope = secant.slope();
+    const double bits = found_.geometry_bits_per_point();
+    expected_bits_ = bits * std::pow(next / plan.step_m, value == &CodedSum::rms_m ? -kBitsPerStep : slope);
+    const bool at_end = next == plan.step_m;
+    plan.step_m = next;
+    // The last stretch needs no try: the slope is known.
+    leapt_ = secant.is_leap();
+    if (at_end || leapt_ || std::abs(got / target - 1) <= close) break;
   }
-  if (!(side > 0)) return schema.step_m;  // all points equal: any step will do
-  double fine = side * kFinest, coarse = side * kCoarsest;
-  for (int i = 0; i < 11; ++i) {
-    if (stop != nullptr && stop->load()) return make_error(ErrorCode::kCancelled, "interrupted");
-    const double middle = std::sqrt(fine * coarse);
-    MAPCODEC_ASSIGN(const double bits, bits_at(middle, sample, schema, settings, arena));
-    (bits > bits_per_point ? fine : coarse) = middle;
+  return {};
+}
+
+/// Errors first on little, which gives the slope; sizes not, because small tiles take more bits.
+Status RateSearch::seek(CodingPlan& plan, const MapSchema& schema, Value value, double target, double slope,
+                        const Range& steps) {
+  if (value == &CodedSum::rms_m && sample_.points() > 2 * kFewPoints) {
+    MAPCODEC_TRY(seek_on(sample_.part(kFewPoints), plan, schema, value, target, steps, slope));
   }
-  if (coarse > side * kCoarsest * 0.99) {
+  MAPCODEC_TRY(seek_on(sample_, plan, schema, value, target, steps, slope));
+  (value == &CodedSum::rms_m ? rms_slope_ : bits_slope_) = std::abs(slope);
+  return {};
+}
+
+Result<CodingPlan> RateSearch::for_rms(CodingPlan plan, double rms_m) {
+  // Half a voxel is what its centre loses. What surfaces lose depends on how far the points lie apart.
+  const double spacings = sample_.spacing_m > 0 ? rms_m / sample_.spacing_m : 1;
+  plan.step_m = rms_m * (plan.has_surfaces() ? std::clamp(1.1 * spacings, 0.5, 3.0) : 2.0);
+  // Beyond the size of the whole nothing is lost by coarser steps any more, and nothing gained.
+  const Range steps{rms_m / 16, 8 * std::max(sample_.side_m, rms_m)};
+  MAPCODEC_TRY(seek(plan, positions_alone(schema_), &CodedSum::rms_m, kRmsAim * rms_m, 0.5, steps));
+  return plan;
+}
+
+Result<CodingPlan> RateSearch::for_bits(CodingPlan plan, double bits_per_point) {
+  if (!(sample_.side_m > 0)) {
+    plan.step_m = 1;  // all points equal: any step will do
+    return plan;
+  }
+  const Range steps{sample_.side_m * kFinest, sample_.side_m / 8};
+  plan.step_m = std::clamp(sample_.spacing_m, steps.finest, steps.coarsest);
+  MAPCODEC_TRY(seek(plan, schema_, &CodedSum::bits_per_point, bits_per_point, -1, steps));
+  if (plan.step_m == steps.coarsest && found_.bits_per_point() > bits_per_point * (1 + kCloseEnough)) {
     return make_error(ErrorCode::kInvalidArgument,
                       "the asked size cannot be reached: channels take more than that alone");
   }
-  return coarse;
+  return plan;
 }
 
-Result<double> find_step_for_color(std::size_t channel, const TileSet& tiles, const MapSchema& schema,
-                                   Arena& arena) {
-  MAPCODEC_ASSIGN(const std::vector<PointCloud> sample, sample_tiles(tiles));
+Result<double> find_step_for_color(std::size_t channel, double step_m, const TileSample& sample,
+                                   const MapSchema& schema, Arena& arena) {
   // Room below the bound for what coding itself loses, and for tiles that the sample did not show.
   const double wanted = 0.8 * schema.channels[channel].bound;
-  double fine = schema.step_m / 64, coarse = schema.step_m;
+  double fine = step_m / 64, coarse = step_m;
   MAPCODEC_ASSIGN(const double floor, color_floor_at(coarse, channel, sample, schema, arena));
   if (floor <= wanted) return coarse;
   for (int i = 0; i < 7; ++i) {

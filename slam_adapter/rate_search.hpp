@@ -1,24 +1,62 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+// Finds the one step of a map that meets a promise or a size, on a sample of its tiles.
 #pragma once
 
-#include <atomic>
-
-#include "mapcodec/codec/tile_codec.hpp"
-#include "parallel/tile_set.hpp"
+#include "slam_adapter/tile_sample.hpp"
 
 namespace mapcodec {
 
-/// The voxel side [m] with which `tiles` take about `bits_per_point` bits, channels included, found by coding
-/// a sample of at most four tiles, evenly spread. Errors: those of encoding; InvalidArgument where the
-/// channels alone take more.
-[[nodiscard]] Result<double> find_step_for_bits(double bits_per_point, const TileSet& tiles,
-                                                const MapSchema& schema, const TileSettings& settings,
-                                                Arena& arena, const std::atomic<bool>* stop);
+/// Tries plans on a sample and remembers what they gave.
+class RateSearch {
+ public:
+  /// All must outlive the search. @param schema  its channels count for sizes, not for errors.
+  RateSearch(const TileSample& sample, const MapSchema& schema, Arena& arena, const std::atomic<bool>* stop)
+      : sample_(sample), schema_(schema), arena_(arena), stop_(stop) {}
 
-/// The largest voxel side <= schema.step_m on which colour `channel` (an index into schema.channels, bounded)
-/// can keep its bound: coarser voxels hold points of too different colours at one position. Measured on the
-/// same sample. Errors: those of encoding.
-[[nodiscard]] Result<double> find_step_for_color(std::size_t channel, const TileSet& tiles,
+  /// The step with which the sample's RMS is a little below `rms_m`, within about 1 %. Where even coarse
+  /// steps lose less (all points equal, say), a coarse one. Errors: those of encoding; Cancelled.
+  [[nodiscard]] Result<CodingPlan> for_rms(CodingPlan plan, double rms_m);
+  /// The step with which the sample takes about `bits_per_point`, channels included. Errors: InvalidArgument
+  /// where no step does, because channels alone take more; those of encoding; Cancelled.
+  [[nodiscard]] Result<CodingPlan> for_bits(CodingPlan plan, double bits_per_point);
+  /// Positions alone.
+  [[nodiscard]] Result<CodedSum> measure(const CodingPlan& plan) const;
+
+  /// What the last search measured last, at a step near that of its plan.
+  [[nodiscard]] const CodedSum& found() const { return found_; }
+  /// Whether its value leaps across the target, so that the plan is on one side of it.
+  [[nodiscard]] bool leapt() const { return leapt_; }
+  /// Bits per point for positions that it expects of its plan.
+  [[nodiscard]] double expected_bits() const { return expected_bits_; }
+  /// By how much the logarithm of the RMS grows with that of the step, near the last search's end.
+  [[nodiscard]] double rms_slope() const { return rms_slope_; }
+  /// By how much the logarithm of the size falls.
+  [[nodiscard]] double bits_slope() const { return bits_slope_; }
+
+ private:
+  const TileSample& sample_;
+  const MapSchema& schema_;
+  Arena& arena_;
+  const std::atomic<bool>* stop_;
+  using Value = double (CodedSum::*)() const;
+  struct Range {
+    double finest, coarsest;
+  };
+  [[nodiscard]] Status seek(CodingPlan& plan, const MapSchema& schema, Value value, double target,
+                            double slope, const Range& steps);
+  [[nodiscard]] Status seek_on(const TileSample& sample, CodingPlan& plan, const MapSchema& schema,
+                               Value value, double target, const Range& steps, double& slope);
+
+  CodedSum found_;
+  bool leapt_ = false;
+  double expected_bits_ = 0;
+  double rms_slope_ = 1, bits_slope_ = 1;
+};
+
+/// The largest voxel side <= step_m on which colour `channel` (an index into schema.channels, bounded) can
+/// keep its bound with `points`: coarser voxels hold points of too different colours at one position. Errors:
+/// those of encoding.
+[[nodiscard]] Result<double> find_step_for_color(std::size_t channel, double step_m, const TileSample& sample,
                                                  const MapSchema& schema, Arena& arena);
 
 }  // namespace mapcodec

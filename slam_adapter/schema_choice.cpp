@@ -2,6 +2,8 @@
 #include "slam_adapter/schema_choice.hpp"
 
 #include <algorithm>
+#include <cmath>
+#include <initializer_list>
 
 #include "slam_adapter/lattice.hpp"
 #include "slam_adapter/map_file.hpp"
@@ -73,7 +75,43 @@ void say_what_is_dropped(const MapSchema& schema, const CompressOptions& options
   }
 }
 
+struct NamedNumber {
+  const char* name;
+  double value;
+};
+
+Status check_all(std::initializer_list<NamedNumber> numbers, bool may_be_zero) {
+  for (const NamedNumber& n : numbers) {
+    // Written so that NaN fails.
+    if (std::isfinite(n.value) && (n.value > 0 || (may_be_zero && n.value == 0))) continue;
+    return make_error(ErrorCode::kInvalidArgument,
+                      std::string("the ") + n.name + " is not a " +
+                          (may_be_zero ? "number of 0 or more" : "positive number"));
+  }
+  return {};
+}
+
 }  // namespace
+
+Status check_numbers(const CompressOptions& o) {
+  const bool bounded = o.promise == PromiseKind::rms || o.promise == PromiseKind::max_error;
+  MAPCODEC_TRY(check_all({{"error bound", bounded ? o.promise_m : 1},
+                          {"unit", o.unit_m},
+                          {"target ratio", o.target_ratio.value_or(1)},
+                          {"target of bits per point", o.target_bits_per_point.value_or(1)},
+                          {"plane distance", o.paper.distance_m},
+                          {"alpha radius", o.paper.alpha_m}},
+                         false));
+  return check_all({{"colour error", o.color_error},
+                    {"tile size", o.tile_size_m},
+                    {"share to process", o.paper.perc_process},
+                    {"outlier radius", o.paper.outlier_radius_m},
+                    {"least area density", o.paper.rel_area},
+                    {"density outside", o.paper.outside_density},
+                    {"contour reduction", o.paper.reduction_m},
+                    {"step of the remaining points", o.paper.leftover_step_m}},
+                   true);
+}
 
 Result<MapSchema> choose_schema(const Survey& survey, const CompressOptions& options, const Vec3& origin,
                                 double tile_size_m, std::vector<std::string>& warnings) {

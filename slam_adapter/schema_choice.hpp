@@ -8,6 +8,10 @@
 
 namespace mapcodec {
 
+/// InvalidArgument, naming it, if a number of `options` is not finite or has a sign that makes no sense.
+/// Ranges that depend on the cloud are checked later.
+[[nodiscard]] Status check_numbers(const CompressOptions& options);
+
 /// Decides lattice and channels. What will not be kept as asked is added to `warnings`.
 /// Errors: InvalidArgument (unknown channel name); Empty (no finite point).
 [[nodiscard]] Result<MapSchema> choose_schema(const Survey& survey, const CompressOptions& options,

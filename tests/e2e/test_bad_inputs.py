@@ -213,6 +213,11 @@ class BadInputs(ProgramTest):
                           ("decompress", archive, "-o", self.path("x.pcd"), "--sphere", "0,0,0,-1"),
                           ("decompress", archive, "-o", self.path("x.pcd"), "--box", "a,b,c,d,e,f")):
             self.fails(USAGE, *arguments)
+        for flag in ("--max-error", "--rms", "--target-bpp", "--target-ratio", "--tile-size", "--unit", "--color-error"):
+            self.fails(USAGE, "compress", source, "-o", out, flag, "nan", says="number")
+            self.fails(USAGE, "compress", source, "-o", out, flag, "inf")
+        for flag in ("--distance", "--alpha", "--rel-area", "--outlier-radius", "--perc-process", "--outside-density"):
+            self.fails(USAGE, "compress", source, "-o", out, "--paper", flag, "nan", says="number")
         self.fails(USAGE, "compress", source, "-o", out, "--channels", "no_such_channel", "--max-error", 0.01)
         self.assertEqual(self.listing(), ["good.mapc", "in.pcd"])
 

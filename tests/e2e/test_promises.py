@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What each promise says, measured here and not by the program."""
+import random
 import unittest
 from collections import Counter
 
 from clouds import (FULL, RGB, XYZ, Cloud, Nearest, columns, pack, pcd_bytes, ply_bytes, positions, read_pcd, room,
-                    symmetric_rms, write)
+                    symmetric_rms, to_float32, write)
 from program import DIFFERENCE, ProgramTest
 
 
@@ -38,6 +39,57 @@ class Promises(ProgramTest):
         for bound in (0.003, 0.02):
             decoded = self.round_trip(cloud, "--rms", bound)
             self.assertLessEqual(symmetric_rms(positions(cloud), positions(decoded), 0.3), bound * 1.0001)
+
+    def test_rms_uses_surfaces_and_comes_close(self):
+        source = write(self.path("in.pcd"), pcd_bytes(room(60000, XYZ, noise=0.002)))
+        archive = self.compress(source, "--rms", 0.03, "--threads", 1)
+        info = self.succeeds("info", archive, "--json").json
+        self.assertIn("surface", info["codecs"])
+        self.assertEqual(info["points"], 60000)
+        measured = self.succeeds("evaluate", source, archive, "--json").json
+        self.assertLessEqual(measured["rms_m"], 0.03)
+        self.assertGreaterEqual(measured["rms_m"], 0.9 * 0.03)
+        self.assertEqual(measured["count_ratio"], 1)
+        again = self.compress(source, "--rms", 0.03, "--threads", 2, name="again.mapc")
+        self.assertEqual(archive.read_bytes(), again.read_bytes())
+        self.succeeds("verify", archive, "--against", source)
+
+    def test_codecs_of_one_map_may_differ(self):
+        """A dense wall beside sparse dust: surfaces for the one, points for the other."""
+        r = random.Random(3)
+        wall = [(r.random() * 4, r.random() * 4, r.gauss(0, 0.002)) for _ in range(40000)]
+        dust = [tuple(20 + r.random() * 4 for _ in range(3)) for _ in range(6000)]
+        cloud = Cloud(XYZ, [tuple(to_float32(v) for v in p) for p in wall + dust])
+        source = write(self.path("in.pcd"), pcd_bytes(cloud))
+        archive = self.compress(source, "--rms", 0.02, "--tile-size", 8)
+        codecs = self.succeeds("info", archive, "--json").json["codecs"]
+        self.assertEqual(set(codecs), {"surface", "points"})
+        self.assertEqual(len(read_pcd(self.decompress(archive)).rows), len(cloud.rows))
+        part = read_pcd(self.decompress(archive, "--box", "0,0,-1,2,4,1", "--force"))
+        self.assertTrue(all(p[0] <= 2 for p in positions(part)))
+        self.assertAlmostEqual(len(part.rows), 20000, delta=600)
+        self.succeeds("verify", archive, "--against", source)
+
+    def test_one_codec_may_be_asked_for(self):
+        source = write(self.path("in.pcd"), pcd_bytes(room(20000, XYZ)))
+        for codec in ("surface", "points"):
+            archive = self.compress(source, "--rms", 0.02, "--codec", codec, "--force")
+            self.assertEqual(set(self.succeeds("info", archive, "--json").json["codecs"]), {codec})
+            self.succeeds("verify", archive, "--against", source)
+
+    def test_resampled_points_have_no_ring(self):
+        cloud = room(20000)
+        source = write(self.path("in.pcd"), pcd_bytes(cloud))
+        said = self.succeeds("compress", source, "-o", self.path("map.mapc"), "--rms", 0.05, "--codec", "surface").err
+        self.assertRegex(said, "'ring' is not kept.*--max-error")
+        kept = {c["name"]: c["kept"] for c in self.succeeds("info", self.path("map.mapc"), "--json").json["channels"]}
+        self.assertEqual((kept["ring"], kept["intensity"], kept["rgb"]), ("dropped", "bounded", "bounded"))
+
+    def test_rms_of_one_point_many_times(self):
+        source = write(self.path("in.pcd"), pcd_bytes(Cloud(XYZ, [(1.0, 2.0, 3.0)] * 500)))
+        archive = self.compress(source, "--rms", 0.01)
+        self.assertEqual(self.succeeds("info", archive, "--json").json["points"], 500)
+        self.succeeds("verify", archive, "--against", source)
 
     def test_rms_is_the_default(self):
         source = write(self.path("in.pcd"), pcd_bytes(room(3000)))

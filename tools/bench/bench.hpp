@@ -17,6 +17,9 @@ struct BenchSettings {
   std::vector<std::string> files;  ///< if not empty: only clouds whose path contains one of these
   bool quick = false;              ///< few clouds and bounds: minutes instead of an hour
   std::function<void(const std::string&)> say = [](const std::string&) {};  ///< told what is being measured
+  bool goals_alone = false;  ///< bench_surface: only the clouds with goals, at these
+  std::function<void(const std::string&)> print = [](const std::string&) {
+  };  ///< lines of tables, as they come
 };
 
 /// Size against error and speed, ours beside the peers (rate.json, rate.md, rate_*.png).
@@ -26,6 +29,9 @@ struct BenchSettings {
 /// Speed on one to all cores, and what the measured tiles would take on more (scaling.json, scaling.md,
 /// scaling.png).
 [[nodiscard]] Status bench_scaling(const BenchSettings& settings);
+/// Surfaces, points and the choice between them at promises around each cloud's spacing, and the surface
+/// codec's goals (surface.json, surface.md).
+[[nodiscard]] Status bench_surface(const BenchSettings& settings);
 /// The experiments of Morell et al. 2014 on our data (paper.json, paper.md, paper_*.png).
 [[nodiscard]] Status bench_paper(const BenchSettings& settings);
 

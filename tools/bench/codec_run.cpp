@@ -51,6 +51,9 @@ Result<CodecRun> run_codec(const PointCloud& cloud, const CompressOptions& optio
   MAPCODEC_ASSIGN(const MapFile map, MapFile::open(scratch));
   MAPCODEC_TRY(decode_by_tiles(map, run));
   const MapSummary summary = map.summary();
+  if (const auto surface = summary.codecs.find("surface"); surface != summary.codecs.end()) {
+    run.surface_share = static_cast<double>(surface->second.points) / static_cast<double>(summary.points);
+  }
   run.archive_bytes = summary.bytes;
   run.raw_bytes = summary.raw_bytes;
   run.encode_seconds = sum(run.report.tile_seconds);

@@ -17,6 +17,7 @@ struct CodecRun {
   double encode_seconds = 0;                ///< processor time of all tiles together
   double decode_seconds = 0;                ///< the same for decoding, fetching included
   std::vector<double> tile_decode_seconds;  ///< in Morton order
+  double surface_share = 0;                 ///< of the points, those in `surface` tiles
   PointCloud decoded;
 };
 

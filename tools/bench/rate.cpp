@@ -100,6 +100,14 @@ std::vector<Mode> bounded_modes(double bound_m) {
     o.effort = effort;
     modes.push_back({name, o});
   }
+  for (const auto& [name, codecs] :
+       {std::pair{"surface", CodecChoice::surface}, std::pair{"auto", CodecChoice::cheapest}}) {
+    CompressOptions o = geometry_alone();
+    o.promise = PromiseKind::rms;
+    o.promise_m = bound_m;
+    o.codecs = codecs;
+    modes.push_back({name, o});
+  }
   return modes;
 }
 
@@ -249,7 +257,7 @@ Status bench_rate(const BenchSettings& settings) {
   MAPCODEC_ASSIGN(const std::vector<std::string> paths, bench::find_clouds(settings));
   report.line(
       "Geometry alone, bits per input point; a bound is the largest error along an axis, cells are twice as "
-      "wide.");
+      "wide; of surface and auto it is the RMS.");
   report.line(
       "Speeds are of one core, by its processor time: ours with quantising, measuring and reading the "
       "archive, peers' in memory.");

@@ -18,8 +18,10 @@ struct Arguments {
 
 int run(Arguments& a) {
   a.settings.say = [](const std::string& text) { fmt::print(stderr, "{}\n", text); };
+  a.settings.print = [](const std::string& text) { fmt::print("{}\n", text); };
   const Status s = a.what == "paper"     ? bench_paper(a.settings)
                    : a.what == "scaling" ? bench_scaling(a.settings)
+                   : a.what == "surface" ? bench_surface(a.settings)
                                          : bench_rate(a.settings);
   if (!s.ok()) return fail(a.settings.data, s.error());
   fmt::print("{}/{}.md\n", a.settings.report, a.what);
@@ -31,14 +33,15 @@ int run(Arguments& a) {
 void add_bench(CLI::App& app, Action& action) {
   auto a = std::make_shared<Arguments>();
   CLI::App* verb = app.add_subcommand("bench", "Measurements on a folder of clouds: JSON, tables and plots");
-  verb->add_option("WHAT", a->what, "paper, rate or scaling")
+  verb->add_option("WHAT", a->what, "paper, rate, scaling or surface")
       ->required()
-      ->check(CLI::IsMember({"paper", "rate", "scaling"}));
+      ->check(CLI::IsMember({"paper", "rate", "scaling", "surface"}));
   verb->add_option("--data", a->settings.data, "Folder that is searched for clouds")->required();
   verb->add_option("-o,--output", a->settings.report, "Folder for the report")->required();
   verb->add_option("--threads", a->settings.threads, "0: all cores")->check(CLI::Range(0, 1024));
   verb->add_option("--only", a->settings.files, "Only clouds whose path contains one of these");
   verb->add_flag("--quick", a->settings.quick, "Few clouds and bounds");
+  verb->add_flag("--goals", a->settings.goals_alone, "surface: only the figures that it is built for");
   verb->callback([a, &action] { action = [a] { return run(*a); }; });
 }
 

@@ -17,7 +17,7 @@ struct Arguments {
   std::string output;
   std::optional<double> rms, max_error, target_ratio, target_bpp;
   bool lossless = false, paper = false, paper_raw = false, json = false, no_counts = false;
-  std::string channels = "all", effort = "default", max_memory, progress = "auto";
+  std::string channels = "all", effort = "default", max_memory, progress = "auto", codec = "auto";
   CompressOptions options;
 };
 
@@ -75,10 +75,14 @@ void add_coding(CLI::App& verb, Arguments& a) {
       ->capture_default_str();
   verb.add_option("--channels", a.channels, "all, none, or names separated by commas")->capture_default_str();
   verb.add_option("--tile-size", o.tile_size_m,
-                  "Side of a tile [m]; default from the density, about 100k points")
+                  "Side of a tile [m]; default from the density, 100k points, 600k of surfaces")
       ->check(CLI::PositiveNumber);
   verb.add_option("--effort", a.effort, "Speed against size at the same promise: fast, default, high")
       ->check(CLI::IsMember({"fast", "default", "high"}))
+      ->capture_default_str();
+  verb.add_option("--codec", a.codec,
+                  "With --rms or a target: surface, points, or for each tile the cheaper one")
+      ->check(CLI::IsMember({"auto", "surface", "points"}))
       ->capture_default_str();
   verb.add_flag("--keep-order", o.keep_order, "With --lossless: also the order of the points");
   verb.add_flag("--no-counts", a.no_counts, "Points that share a voxel become one");
@@ -132,7 +136,12 @@ Status complete(Arguments& a) {
   o.target_bits_per_point = a.target_bpp;
   o.keep_counts = !a.no_counts;
   o.effort = a.effort == "fast" ? Effort::fast : a.effort == "high" ? Effort::high : Effort::standard;
+  o.codecs = a.codec == "surface"  ? CodecChoice::surface
+             : a.codec == "points" ? CodecChoice::points
+                                   : CodecChoice::cheapest;
   o.channels = split(a.channels);
+  if (a.codec == "surface" && (a.max_error || a.lossless || a.paper || a.paper_raw || a.no_counts))
+    return make_error(ErrorCode::kInvalidArgument, "--codec surface is for --rms with counts");
   if (o.keep_order && !a.lossless)
     return make_error(ErrorCode::kInvalidArgument, "--keep-order needs --lossless");
   if (!a.max_memory.empty()) {
@@ -149,8 +158,10 @@ Json report_json(const MapFile& map, const CompressReport& r) {
   j["threads"] = r.threads;
   j["peak_memory_bytes"] = peak_memory_bytes();
   j["geometry_bytes"] = r.geometry_bytes;
+  j["codings"] = r.codings;
   j["seconds"] = {{"survey", r.survey_seconds},
                   {"tiling", r.tiling_seconds},
+                  {"search", r.search_seconds},
                   {"tiles", r.tiles_seconds},
                   {"commit", r.commit_seconds}};
   j["warnings"] = r.warnings;

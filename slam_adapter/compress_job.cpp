@@ -1,0 +1,306 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "slam_adapter/compress_job.hpp"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <filesystem>
+
+#include "parallel/encode_pipeline.hpp"
+#include "parallel/tile_plan.hpp"
+#include "slam_adapter/schema_choice.hpp"
+
+namespace mapcodec {
+namespace {
+
+// A cube is split at 1.5 times this. Smaller tiles cost bits at their borders, larger ones time to the first
+// point.
+constexpr double kTilePoints = 100000;
+// Surfaces take so few bits that what begins anew with each tile weighs more.
+constexpr double kSurfaceTilePoints = 600000;
+// The paper's planes are those of a whole scan: as few cuts as memory and time allow.
+constexpr double kPaperTilePoints = 1000000;
+// A target below this is one that only surfaces meet.
+constexpr double kSurfaceBits = 3;
+
+// Where the map's RMS shall lie in shares of the promise: as little as possible below it, never above.
+constexpr double kLeastRms = 0.95, kRmsAim = 0.98;
+
+using Clock = std::chrono::steady_clock;
+
+double lap(Clock::time_point& from) {
+  const auto now = Clock::now();
+  const double seconds = std::chrono::duration<double>(now - from).count();
+  from = now;
+  return seconds;
+}
+
+std::uint64_t memory_budget(const CompressOptions& options) {
+  if (options.max_memory_bytes != 0) return options.max_memory_bytes;
+  const long pages = sysconf(_SC_PHYS_PAGES), page = sysconf(_SC_PAGESIZE);
+  return pages > 0 && page > 0 ? std::uint64_t(pages) * std::uint64_t(page) / 2 : std::uint64_t{2} << 30;
+}
+
+std::string folder_of(const std::string& path) {
+  const auto parent = std::filesystem::path(path).parent_path();
+  return parent.empty() ? "." : parent.string();
+}
+
+/// Mean distance of neighbours [m], from the survey's thinned sample: on surfaces it falls with the root of
+/// the number.
+double rough_spacing(const Survey& survey) {
+  if (survey.sample.empty()) return 0;
+  return mean_spacing(survey.sample) * std::sqrt(double(survey.sample.size()) / double(survey.points));
+}
+
+}  // namespace
+
+Result<CompressReport> CompressJob::run() {
+  auto begin = Clock::now(), at = begin;
+  MAPCODEC_TRY(look_at_source());
+  report_.survey_seconds = lap(at);
+  MAPCODEC_TRY(make_tiles());
+  report_.tiling_seconds = lap(at);
+  MAPCODEC_ASSIGN(choice_, choose_plan(options_, *tiles_, schema_, arena_, report_.warnings));
+  report_.search_seconds = lap(at);
+  MAPCODEC_TRY(encode_until_kept());
+  report_.seconds = lap(begin);
+  report_.threads = arena_.threads();
+  report_.points = survey_.points;
+  report_.dropped_points = survey_.dropped;
+  return std::move(report_);
+}
+
+Status CompressJob::look_at_source() {
+  SurveySettings s;
+  s.memory_budget_bytes = memory_budget(options_);
+  s.arena = &arena_;
+  s.progress = options_.progress;
+  s.stop = options_.stop;
+  MAPCODEC_ASSIGN(survey_, survey(source_, s));
+  if (survey_.dropped > 0) {
+    report_.warnings.push_back(std::to_string(survey_.dropped) +
+                               " points without a finite position were dropped");
+  }
+  report_.warnings.insert(report_.warnings.end(), survey_.warnings.begin(), survey_.warnings.end());
+  return {};
+}
+
+Status CompressJob::make_tiles() {
+  TilePlanSettings plan;
+  if (options_.tile_size_m > 0) plan.tile_size_m = options_.tile_size_m;
+  plan.target_points = points_per_tile();
+  const double step = smallest_step();
+  if (step > 0) plan.max_side_m = step * double(1 << 20);
+  MAPCODEC_ASSIGN(plan_, plan_tiles(survey_, plan));
+  MAPCODEC_ASSIGN(schema_,
+                  choose_schema(survey_, options_, plan_.origin(), plan_.tile_size_m(), report_.warnings));
+  position_step_ = schema_.step_m;
+  TileSetSettings s;
+  s.memory_budget_bytes = memory_budget(options_);
+  s.temp_dir = options_.temp_folder.empty() ? folder_of(path_) : options_.temp_folder;
+  s.arena = &arena_;
+  s.progress = options_.progress;
+  s.stop = options_.stop;
+  auto tiles =
+      survey_.cloud ? build_tiles(std::move(*survey_.cloud), plan_, s) : build_tiles(source_, plan_, s);
+  survey_.cloud.reset();
+  if (!tiles.ok()) return tiles.error();
+  tiles_ = std::make_unique<TileSet>(std::move(tiles).value());
+  return {};
+}
+
+double CompressJob::points_per_tile() const {
+  if (options_.promise == PromiseKind::paper) return kPaperTilePoints;
+  if (allowed_codecs(options_) == CodecChoice::points) return kTilePoints;
+  const bool coarse =
+      has_target()
+          ? options_.target_bits_per_point.value_or(96 * options_.target_ratio.value_or(1)) < kSurfaceBits
+          : options_.promise_m > rough_spacing(survey_);
+  return coarse ? kSurfaceTilePoints : kTilePoints;
+}
+
+/// A voxel side that the promise will not go below, 0 where there is none.
+double CompressJob::smallest_step() const {
+  if (options_.promise == PromiseKind::max_error || options_.promise == PromiseKind::rms)
+    return options_.promise_m;
+  return 0;
+}
+
+Status CompressJob::encode_until_kept() {
+  constexpr int kTries = 12;
+  for (int i = 0;; ++i) {
+    auto at = Clock::now();
+    MAPCODEC_TRY(encode_once());
+    report_.tiles_seconds += lap(at);
+    report_.codings = i + 1;
+    if (is_kept_or_adjust()) break;
+    if (i + 1 == kTries)
+      return make_error(ErrorCode::kPromiseBroken, "no step was found that keeps the promise");
+  }
+  say_if_finer_for_color();
+  say_if_color_misses();
+  auto at = Clock::now();
+  MAPCODEC_TRY(commit());
+  report_.commit_seconds = lap(at);
+  return {};
+}
+
+/// What was measured on the sample may be off for the whole map: then the step is changed.
+bool CompressJob::is_kept_or_adjust() {
+  if (has_target()) return meets_target_or_adjust();
+  if (schema_.promise == PromiseKind::rms && !meets_rms_or_adjust()) return false;
+  return meets_color_or_adjust();
+}
+
+bool CompressJob::meets_rms_or_adjust() {
+  const double promise = schema_.promise_value, rms = coded_.rms_m();
+  CodingPlan& plan = choice_.plan;
+  if (!plan.has_surfaces()) {
+    if (rms <= promise) return true;
+    plan.step_m *= 0.999 * promise / rms;
+    return false;
+  }
+  if (coded_.surface_share() == 0 && options_.codecs == CodecChoice::cheapest) {
+    // No tile took surfaces after all: one voxel side for the whole map is simpler, and its error known
+    // beforehand.
+    plan.choice = CodecChoice::points;
+    plan.step_m = position_step_;
+    return false;
+  }
+  // A step of the map's size loses all it can; and colour may ask for finer steps than the positions.
+  const bool can_be_coarser =
+      plan.step_m < 4 * std::max(choice_.side_m, promise) && color_tries_ == 0 && rms_tries_ < 3;
+  if (rms <= promise && rms > best_rms_) {
+    best_rms_ = rms;
+    best_step_ = plan.step_m;
+  }
+  if (rms <= promise && rms >= kLeastRms * promise) return true;
+  if (rms <= promise && !can_be_coarser) {
+    const bool was_better = rms < best_rms_ && color_tries_ == 0;
+    if (was_better) plan.step_m = best_step_;
+    return !was_better;
+  }
+  // After colour had its say the search begins anew.
+  if (!secant_ || color_tries_ > 0)
+    secant_.emplace(kRmsAim * promise, std::clamp(choice_.rms_slope, 0.25, 1.2));
+  plan.step_m = secant_->next(plan.step_m, rms);
+  ++rms_tries_;
+  return false;
+}
+
+bool CompressJob::meets_color_or_adjust() {
+  const auto color = bounded_color();
+  CodingPlan& plan = choice_.plan;
+  const double error = coded_.errors().color_error;
+  if (!color || !(plan.step_m > 0) || !(error > schema_.channels[*color].bound)) return true;
+  if (!plan.has_surfaces() && schema_.coordinates.kind == CoordinateFormat::Kind::fixed) return true;
+  // Some tiles can do no better than their positions allow: the others have to be better, and if that is not
+  // enough, the steps smaller.
+  color_target_ *= std::min(0.98, schema_.channels[*color].bound / error);
+  if (++color_tries_ > (plan.has_surfaces() ? 2 : 1)) plan.step_m *= color_tries_ < 5 ? 0.85 : 0.6;
+  return false;
+}
+
+std::optional<std::size_t> CompressJob::bounded_color() const {
+  for (std::size_t i = 0; i < schema_.channels.size(); ++i) {
+    if (schema_.channels[i].info.name == "rgb" && schema_.channels[i].kept == ChannelKept::bounded) return i;
+  }
+  return std::nullopt;
+}
+
+void CompressJob::say_if_finer_for_color() {
+  if (has_target()) return;
+  const bool surfaces = choice_.plan.has_surfaces();
+  // Among surfaces the step follows the RMS and is nobody's promise: only what colour took from it counts.
+  const bool finer = surfaces ? color_tries_ > 2 : choice_.plan.step_m < position_step_;
+  if (!finer || !bounded_color()) return;
+  const std::string what = surfaces ? "surfaces are coded in steps of " + millimetres(choice_.plan.step_m)
+                                    : "voxels are " + millimetres(choice_.plan.step_m) + " instead of " +
+                                          millimetres(position_step_);
+  report_.warnings.push_back(
+      what + ", so that colours keep their bound (a larger --color-error makes the map smaller)");
+}
+
+/// On a source's own lattice voxels are not made finer for colour.
+void CompressJob::say_if_color_misses() {
+  const auto color = bounded_color();
+  const double error = coded_.errors().color_error;
+  if (!color || !(error > schema_.channels[*color].bound)) return;
+  report_.warnings.push_back("the colour error is " + std::to_string(error) +
+                             ", above the bound: points of different colours share a position");
+}
+
+/// What was achieved is what is promised.
+bool CompressJob::meets_target_or_adjust() {
+  const double ratio = target_bits(options_, schema_) / coded_.bits_per_point();
+  schema_.promise_value = coded_.rms_m();
+  if ((ratio > 0.98 && ratio < 1.02) || ++target_tries_ > 6) return true;
+  if (!secant_) secant_.emplace(target_bits(options_, schema_), -std::clamp(choice_.bits_slope, 0.3, 1.5));
+  choice_.plan.step_m = secant_->next(choice_.plan.step_m, coded_.bits_per_point());
+  return false;
+}
+
+Status CompressJob::encode_once() {
+  coded_ = {};
+  bounds_ = {};
+  report_.geometry_bytes = 0;
+  report_.tile_seconds.clear();
+  schema_.step_m = choice_.plan.step_m;
+  MapInfo info;
+  info.schema = write_schema(schema_);
+  info.origin = plan_.origin();
+  info.tile_size_m = schema_.tile_size_m;
+  writer_.reset();
+  MAPCODEC_ASSIGN(MapWriter writer, MapWriter::create(path_, info, options_.overwrite));
+  writer_ = std::make_unique<MapWriter>(std::move(writer));
+  PipelineSettings pipeline;
+  pipeline.arena = &arena_;
+  pipeline.memory_budget_bytes = memory_budget(options_);
+  pipeline.progress = options_.progress;
+  pipeline.stop = options_.stop;
+  pipeline.tile_seconds = &report_.tile_seconds;
+  MapSchema target = schema_;
+  if (const auto color = bounded_color()) target.channels[*color].bound *= color_target_;
+  return encode_tiles(
+      *tiles_, [&](const PointCloud& tile) { return encode(tile, target); }, pipeline,
+      [this](const TileKey& key, EncodedTile&& t) { return store(key, std::move(t)); });
+}
+
+/// Later codings keep to the codecs of the first: with a little other step some tiles would change over, and
+/// the error of the map would leap to the other side of the promise.
+Result<EncodedTile> CompressJob::encode(const PointCloud& tile, const MapSchema& target) const {
+  CodingPlan plan = choice_.plan;
+  if (plan.choice == CodecChoice::cheapest && report_.codings > 0) {
+    const auto key = plan_.tile_of(tile.xyz.front());
+    const auto known = key ? codecs_.find(*key) : codecs_.end();
+    if (known != codecs_.end()) plan.fixed = known->second;
+  }
+  return encode_by_plan(tile, target, plan);
+}
+
+Status CompressJob::store(const TileKey& key, EncodedTile&& t) {
+  coded_.add(t);
+  codecs_.emplace(key, t.codec);
+  bounds_.add(t.bounds);
+  report_.geometry_bytes += t.geometry_bytes;
+  return writer_->add(key, static_cast<std::uint8_t>(t.codec), t.points, t.bounds, t.errors, t.bytes);
+}
+
+Status CompressJob::commit() {
+  MapInfo info;
+  info.schema = write_schema(schema_);
+  info.origin = plan_.origin();
+  info.tile_size_m = schema_.tile_size_m;
+  info.input_points = survey_.points;
+  info.input_bytes = options_.input_bytes;
+  info.dropped_points = survey_.dropped;
+  info.achieved = coded_.errors();
+  info.bounds = bounds_;
+  MAPCODEC_TRY(writer_->set_info(std::move(info)));
+  // No clock in the archive of a new map: the same input gives the same bytes.
+  const auto revision = writer_->commit(0);
+  return revision.ok() ? Status{} : Status(revision.error());
+}
+
+}  // namespace mapcodec

@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// One compression, from the first look at the source to the committed archive.
+#pragma once
+
+#include <chrono>
+#include <map>
+#include <memory>
+
+#include "maps/map_writer.hpp"
+#include "parallel/arena.hpp"
+#include "parallel/survey.hpp"
+#include "parallel/tile_set.hpp"
+#include "slam_adapter/compress.hpp"
+#include "slam_adapter/log_secant.hpp"
+#include "slam_adapter/plan_choice.hpp"
+
+namespace mapcodec {
+
+/// Looks at the source, cuts it into tiles, chooses how to code them, and codes them all; again with another
+/// step if the whole map misses what the sample promised. To be run once.
+class CompressJob {
+ public:
+  /// All must outlive the job.
+  CompressJob(PointSource& source, const std::string& path, const CompressOptions& options)
+      : source_(source), path_(path), options_(options), arena_(options.threads) {}
+
+  [[nodiscard]] Result<CompressReport> run();
+
+ private:
+  [[nodiscard]] Status look_at_source();
+  [[nodiscard]] Status make_tiles();
+  [[nodiscard]] double points_per_tile() const;
+  [[nodiscard]] double smallest_step() const;
+  [[nodiscard]] Status encode_until_kept();
+  [[nodiscard]] Status encode_once();
+  [[nodiscard]] Result<EncodedTile> encode(const PointCloud& tile, const MapSchema& target) const;
+  [[nodiscard]] Status store(const TileKey& key, EncodedTile&& t);
+  [[nodiscard]] Status commit();
+
+  [[nodiscard]] bool has_target() const { return options_.target_bits_per_point || options_.target_ratio; }
+  [[nodiscard]] std::optional<std::size_t> bounded_color() const;
+  bool is_kept_or_adjust();
+  bool meets_target_or_adjust();
+  bool meets_rms_or_adjust();
+  bool meets_color_or_adjust();
+  void say_if_finer_for_color();
+  void say_if_color_misses();
+
+  PointSource& source_;
+  const std::string path_;
+  const CompressOptions& options_;
+  Arena arena_;
+  Survey survey_;
+  TilePlan plan_;
+  MapSchema schema_;
+  std::unique_ptr<TileSet> tiles_;
+  std::unique_ptr<MapWriter> writer_;
+  PlanChoice choice_;
+  CodedSum coded_;
+  std::map<TileKey, CodecId, MortonLess> codecs_;  // of the tiles, as the first coding chose them
+  Box bounds_;
+  double position_step_ = 0;             // what the positions' promise alone would allow
+  double best_step_ = 0, best_rms_ = 0;  // of the codings that kept the promise, the one nearest to it
+  std::optional<LogSecant> secant_;      // over the codings of the whole map
+  int target_tries_ = 0, rms_tries_ = 0, color_tries_ = 0;
+  double color_target_ = 1;  // share of the colour bound that tiles aim at
+  CompressReport report_;
+};
+
+}  // namespace mapcodec

@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A part of the map that stands for the whole, to try settings on.
+#pragma once
+
+#include <atomic>
+#include <vector>
+
+#include "parallel/tile_set.hpp"
+#include "slam_adapter/coding_plan.hpp"
+
+namespace mapcodec {
+
+struct TileSample {
+  std::vector<PointCloud> pieces;  ///< compact parts of tiles, every point of the part
+  bool whole = false;              ///< pieces are all tiles of the map, uncut
+  double side_m = 0;               ///< longest side of a piece
+  double spacing_m = 0;            ///< mean distance to the nearest other position
+
+  [[nodiscard]] std::size_t points() const;
+  /// Compact parts of the pieces, `points` together or a little more.
+  [[nodiscard]] TileSample part(std::size_t points) const;
+};
+
+/// The whole map if it is small; else sixteen tiles at most, evenly spread, and of large ones a compact part,
+/// so that trying is cheap. The same for any number of threads. Errors: those of TileSet::load.
+[[nodiscard]] Result<TileSample> take_sample(const TileSet& tiles, Arena& arena);
+
+/// Encodes the pieces in parallel. Errors: those of encoding; Cancelled.
+[[nodiscard]] Result<CodedSum> encode_sample(const TileSample& sample, const MapSchema& schema,
+                                             const CodingPlan& plan, Arena& arena,
+                                             const std::atomic<bool>* stop);
+
+/// Mean distance [m] of some thousand finite points, evenly spread, to the nearest other position.
+[[nodiscard]] double mean_spacing(std::vector<Vec3> points);
+
+}  // namespace mapcodec
