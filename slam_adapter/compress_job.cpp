@@ -24,7 +24,10 @@ constexpr double kPaperTilePoints = 1000000;
 constexpr double kSurfaceBits = 3;
 
 // Where the map's RMS shall lie in shares of the promise: as little as possible below it, never above.
-constexpr double kLeastRms = 0.95, kRmsAim = 0.98;
+constexpr double kLeastRms = 0.95, kRmsAim = 0.992;
+// At low rates the bits fall with the third power of the RMS: coming closer is worth another coding or two.
+constexpr double kNearRms = 0.98;
+constexpr int kTriesForNear = 3;
 
 using Clock = std::chrono::steady_clock;
 
@@ -171,13 +174,14 @@ bool CompressJob::meets_rms_or_adjust() {
   // A step of the map's size loses all it can; and colour may ask for finer steps than the positions.
   const bool can_be_coarser =
       plan.step_m < 4 * std::max(choice_.side_m, promise) && color_tries_ == 0 && rms_tries_ < 3;
-  if (rms <= promise && rms > best_rms_) {
-    best_rms_ = rms;
+  const double bits = coded_.bits_per_point();
+  if (rms <= promise && bits < best_bits_) {
+    best_bits_ = bits;
     best_step_ = plan.step_m;
   }
-  if (rms <= promise && rms >= kLeastRms * promise) return true;
+  if (rms <= promise && rms >= (rms_tries_ < kTriesForNear ? kNearRms : kLeastRms) * promise) return true;
   if (rms <= promise && !can_be_coarser) {
-    const bool was_better = rms < best_rms_ && color_tries_ == 0;
+    const bool was_better = bits > best_bits_ && color_tries_ == 0;
     if (was_better) plan.step_m = best_step_;
     return !was_better;
   }

@@ -59,9 +59,9 @@ class CompressJob {
   CodedSum coded_;
   std::map<TileKey, CodecId, MortonLess> codecs_;  // of the tiles, as the first coding chose them
   Box bounds_;
-  double position_step_ = 0;             // what the positions' promise alone would allow
-  double best_step_ = 0, best_rms_ = 0;  // of the codings that kept the promise, the one nearest to it
-  std::optional<LogSecant> secant_;      // over the codings of the whole map
+  double position_step_ = 0;                     // what the positions' promise alone would allow
+  double best_step_ = 0, best_bits_ = INFINITY;  // of the codings that kept the promise, the smallest
+  std::optional<LogSecant> secant_;              // over the codings of the whole map
   int target_tries_ = 0, rms_tries_ = 0, color_tries_ = 0;
   double color_target_ = 1;  // share of the colour bound that tiles aim at
   CompressReport report_;

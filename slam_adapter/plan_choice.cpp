@@ -114,10 +114,11 @@ class Chooser {
       MapSchema resampled = schema_;
       resampled.channels = resampled_channels(schema_, sample_, said);
       RateSearch s = search(resampled);
-      MAPCODEC_ASSIGN(const CodingPlan plan,
-                      s.for_bits(plan_with(allowed), target_bits(options_, resampled)));
-      if (allowed == CodecChoice::surface || s.found().surface_share() > 0) {
-        take(plan, s);
+      const auto plan = s.for_bits(plan_with(allowed), target_bits(options_, resampled));
+      if (allowed == CodecChoice::surface && !plan.ok()) return plan.error();
+      // Colour within its bound can be dearer on resampled points, so much that only points meet the size.
+      if (plan.ok() && (allowed == CodecChoice::surface || s.found().surface_share() > 0)) {
+        take(*plan, s);
         schema_ = resampled;
         warnings_.insert(warnings_.end(), said.begin(), said.end());
         return {};

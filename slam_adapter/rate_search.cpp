@@ -15,7 +15,7 @@ namespace {
 
 constexpr int kMostTries = 12;
 constexpr std::size_t kFewPoints = 60000;                         // for the first tries
-constexpr double kRmsAim = 0.985;                                 // of the promise
+constexpr double kRmsAim = 0.992;                                 // of the promise
 constexpr double kCloseEnough = 0.06, kCloseEnoughOnAll = 0.015;  // of the target; the rest is extrapolated
 constexpr double kLongestLeap =
     1.1;  // of the step's logarithm: what is far away is not as the slope here says

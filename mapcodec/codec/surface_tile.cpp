@@ -49,10 +49,11 @@ bool is_bounded_color(const ChannelSchema& c) {
 }
 
 /// The values of a channel on the decoded points, in tree order.
-Channel on_decoded(const ChannelSchema& channel, const Channel& original, const NearestPair& near) {
+Channel on_decoded(const ChannelSchema& channel, const Channel& original, const NearestPair& near,
+                   const SamePositions& ties) {
   const bool color = channel.info.name == "rgb" && channel.info.components == 3 &&
                      (channel.info.scalar == ScalarType::u8 || channel.info.scalar == ScalarType::u16);
-  return color ? transfer_color(original, near) : transfer_values(original, near.back);
+  return color ? transfer_color(original, near, ties) : transfer_values(original, near.back);
 }
 
 class TileChannels {
@@ -76,8 +77,8 @@ class TileChannels {
     }
     if (color < coded_.size()) {
       const std::size_t c = coded_[color];
-      MAPCODEC_ASSIGN(SurfaceColor e,
-                      encode_surface_color(schema_.channels[c], tile_.channels[c], near_, encoding, effort_));
+      MAPCODEC_ASSIGN(SurfaceColor e, encode_surface_color(schema_.channels[c], tile_.channels[c], near_,
+                                                           SamePositions(tile_.xyz), encoding, effort_));
       r.channels[color] = std::move(e.bytes);
       r.errors.color_error = e.error;
       shift = e.voxel_shift;
@@ -93,7 +94,7 @@ class TileChannels {
  private:
   [[nodiscard]] Result<Bytes> encode_other(std::size_t c, const surface::VoxelOrder& sorted) const {
     const ChannelSchema& schema = schema_.channels[c];
-    const Channel values = on_decoded(schema, tile_.channels[c], near_);
+    const Channel values = on_decoded(schema, tile_.channels[c], near_, SamePositions(tile_.xyz));
     Channel ordered{values.info, Bytes(values.data.size())};
     for (std::size_t i = 0; i < sorted.order.size(); ++i) {
       std::memcpy(ordered.at(i), values.at(sorted.order[i]), values.info.stride());

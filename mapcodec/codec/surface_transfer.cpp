@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <optional>
 
 #include "mapcodec/attribute/color_encoder.hpp"
@@ -70,13 +71,14 @@ struct OnVoxels {
 class ColorControl {
  public:
   ColorControl(const ChannelSchema& channel, const Channel& original, const NearestPair& near,
-               const SurfaceEncoding& encoding, Effort effort)
+               const SamePositions& ties, const SurfaceEncoding& encoding, Effort effort)
       : channel_(channel),
         original_(original),
         near_(near),
         encoding_(encoding),
         effort_(effort),
-        values_(transfer_color(original, near)) {}
+        ties_(ties),
+        values_(transfer_color(original, near, ties)) {}
 
   Result<SurfaceColor> run() {
     const OnVoxels finest = on_voxels(surface::least_voxel_shift(encoding_.header.depth));
@@ -103,7 +105,7 @@ class ColorControl {
   [[nodiscard]] OnVoxels on_voxels(std::uint8_t shift) const {
     OnVoxels r{shift, surface::order_by_voxels(encoding_.points, encoding_.header.depth, shift), {}, 0};
     r.merged = merge_voxels(gather(values_, r.sorted.order), r.sorted.voxels);
-    r.floor = color_error_between(original_, scatter(r.merged, r.sorted.order), near_);
+    r.floor = color_error_between(original_, scatter(r.merged, r.sorted.order), near_, ties_);
     return r;
   }
 
@@ -130,7 +132,7 @@ class ColorControl {
     std::optional<SurfaceColor> best;
     for (int i = 0; i < kTries; ++i) {
       ChannelEncoding e = encoder.encode(target, effort_);
-      const double error = color_error_between(original_, scatter(e.decoded, on.sorted.order), near_);
+      const double error = color_error_between(original_, scatter(e.decoded, on.sorted.order), near_, ties_);
       SurfaceColor found{std::move(e.bytes), on.shift, error};
       if (!best || is_better(found, *best, bound)) best = std::move(found);
       if (error <= bound && error > 0.98 * bound) break;
@@ -146,12 +148,13 @@ class ColorControl {
   const NearestPair& near_;
   const SurfaceEncoding& encoding_;
   Effort effort_;
+  const SamePositions& ties_;
   Channel values_;
 };
 
 }  // namespace
 
-Channel transfer_color(const Channel& original, const NearestPair& near) {
+Channel transfer_color(const Channel& original, const NearestPair& near, const SamePositions& ties) {
   const std::size_t n = near.back.index.size();
   std::vector<Rgb> sums(n, Rgb{});
   std::vector<std::uint32_t> counts(n);
@@ -162,7 +165,10 @@ Channel transfer_color(const Channel& original, const NearestPair& near) {
   Channel r{original.info, Bytes(n * original.info.stride())};
   for (std::size_t i = 0; i < n; ++i) {
     if (counts[i] == 0) {
-      store(r, i, load_rgb(original, near.back.index[i]), 1);
+      const std::span<const std::uint32_t> same = ties.of(near.back.index[i]);
+      Rgb sum{};
+      for (const std::uint32_t j : same) add(sum, load_rgb(original, j));
+      store(r, i, sum, static_cast<std::int64_t>(same.size()));
     } else {
       store(r, i, sums[i], counts[i]);
     }
@@ -174,13 +180,33 @@ Channel transfer_values(const Channel& original, const Nearest& back) {
   return gather(original, back.index);
 }
 
-double color_error_between(const Channel& original, const Channel& decoded, const NearestPair& near) {
+SamePositions::SamePositions(std::span<const Vec3> points)
+    : order_(points.size()), begin_(points.size()), end_(points.size()) {
+  std::iota(order_.begin(), order_.end(), 0u);
+  std::sort(order_.begin(), order_.end(), [&](std::uint32_t a, std::uint32_t b) {
+    return points[a] != points[b] ? points[a] < points[b] : a < b;
+  });
+  for (std::uint32_t begin = 0, end = 0; begin < order_.size(); begin = end) {
+    while (end < order_.size() && points[order_[end]] == points[order_[begin]]) ++end;
+    for (std::uint32_t i = begin; i < end; ++i) {
+      begin_[order_[i]] = begin;
+      end_[order_[i]] = end;
+    }
+  }
+}
+
+double color_error_between(const Channel& original, const Channel& decoded, const NearestPair& near,
+                           const SamePositions& ties) {
   double forth = 0, back = 0;
   for (std::size_t i = 0; i < near.forth.index.size(); ++i) {
     forth += distance(load_rgb(original, i), load_rgb(decoded, near.forth.index[i]));
   }
   for (std::size_t i = 0; i < near.back.index.size(); ++i) {
-    back += distance(load_rgb(decoded, i), load_rgb(original, near.back.index[i]));
+    // Of originals at one position any may be taken for the nearest: what counts is the mean over them.
+    const std::span<const std::uint32_t> same = ties.of(near.back.index[i]);
+    double sum = 0;
+    for (const std::uint32_t j : same) sum += distance(load_rgb(decoded, i), load_rgb(original, j));
+    back += sum / static_cast<double>(same.size());
   }
   const double scale = original.info.scalar == ScalarType::u16 ? 257 : 1;
   return (forth / static_cast<double>(near.forth.index.size()) +
@@ -189,9 +215,9 @@ double color_error_between(const Channel& original, const Channel& decoded, cons
 }
 
 Result<SurfaceColor> encode_surface_color(const ChannelSchema& channel, const Channel& original,
-                                          const NearestPair& near, const SurfaceEncoding& encoding,
-                                          Effort effort) {
-  return ColorControl(channel, original, near, encoding, effort).run();
+                                          const NearestPair& near, const SamePositions& ties,
+                                          const SurfaceEncoding& encoding, Effort effort) {
+  return ColorControl(channel, original, near, ties, encoding, effort).run();
 }
 
 }  // namespace mapcodec

@@ -8,18 +8,32 @@
 
 namespace mapcodec {
 
+/// Which points stand at the same position: of those any is the nearest.
+class SamePositions {
+ public:
+  explicit SamePositions(std::span<const Vec3> points);
+  /// Indices of all points where point `i` is.
+  [[nodiscard]] std::span<const std::uint32_t> of(std::uint32_t i) const {
+    return std::span(order_).subspan(begin_[i], end_[i] - begin_[i]);
+  }
+
+ private:
+  std::vector<std::uint32_t> order_, begin_, end_;
+};
+
 /// Colour of each decoded point: the mean of the originals whose nearest decoded point it is; where there are
 /// none, that of the nearest original.
 /// @param original  a colour channel: three u8 or u16. @param near  forth: of each original; back: of each
 /// decoded one.
-[[nodiscard]] Channel transfer_color(const Channel& original, const NearestPair& near);
+[[nodiscard]] Channel transfer_color(const Channel& original, const NearestPair& near,
+                                     const SamePositions& ties);
 
 /// Each decoded point has the value of its nearest original.
 [[nodiscard]] Channel transfer_values(const Channel& original, const Nearest& back);
 
 /// Mean RGB distance (0..255) between nearest neighbours, mean of both directions: what `evaluate` measures.
 [[nodiscard]] double color_error_between(const Channel& original, const Channel& decoded,
-                                         const NearestPair& near);
+                                         const NearestPair& near, const SamePositions& ties);
 
 struct SurfaceColor {
   Bytes bytes;               ///< a channel's section
@@ -32,7 +46,7 @@ struct SurfaceColor {
 /// the least error.
 /// @param encoding  for its points; unchanged. @param near  of originals and encoding.decoded.
 [[nodiscard]] Result<SurfaceColor> encode_surface_color(const ChannelSchema& channel, const Channel& original,
-                                                        const NearestPair& near,
+                                                        const NearestPair& near, const SamePositions& ties,
                                                         const SurfaceEncoding& encoding, Effort effort);
 
 }  // namespace mapcodec

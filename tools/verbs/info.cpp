@@ -15,16 +15,16 @@ struct Arguments {
 };
 
 void print_tiles(const MapFile& map) {
-  fmt::print("\n{:>22} {:>9} {:>10} {:>10} {:>10}\n", "tile (level: x,y,z)", "points", "bytes", "bits/pt",
-             "RMS");
+  fmt::print("\n{:>22} {:>9} {:>9} {:>10} {:>10} {:>10}\n", "tile (level: x,y,z)", "codec", "points", "bytes",
+             "bits/pt", "RMS");
   for (const TileRecord& t : map.archive().tiles()) {
     std::uint64_t bytes = 0;
     for (const SegmentRef& s : t.segments) bytes += s.length;
     const std::string key = t.key.is_unplaced()
                                 ? std::string("unplaced")
                                 : fmt::format("{}: {},{},{}", t.key.level, t.key.x, t.key.y, t.key.z);
-    fmt::print("{:>22} {:>9} {:>10} {:>10.3f} {:>10}\n", key, t.points, bytes,
-               8.0 * double(bytes) / double(t.points), human_length(t.errors.rms_m));
+    fmt::print("{:>22} {:>9} {:>9} {:>10} {:>10.3f} {:>10}\n", key, codec_name(static_cast<CodecId>(t.codec)),
+               t.points, bytes, 8.0 * double(bytes) / double(t.points), human_length(t.errors.rms_m));
   }
 }
 
