@@ -75,6 +75,16 @@ def crowded_room():
     return pcd(XYZ, [tuple(p) for p, _, _ in room(random.Random(2), 3000, noise=0.001)] + [(1, 1, 1)] * 300)
 
 
+def dense_room():
+    """Many points a leaf: coarse counts, wedges."""
+    return pcd(XYZ, [tuple(p) for p, _, _ in room(random.Random(10), 12000, noise=0.002)])
+
+
+def noisy_room():
+    """Walls as thick as the asked error: blocks of voxels and thick leaves."""
+    return pcd(XYZ, [tuple(p) for p, _, _ in room(random.Random(11), 9000, noise=0.3)])
+
+
 def dust():
     """No surface anywhere: the lowest levels of the tree are noise."""
     r = random.Random(3)
@@ -145,8 +155,8 @@ def survey():
 CLOUDS = {
     "points_fast": ("a.pcd", colored_room, "--max-error 0.005 --effort fast"),
     "points_default": ("a.pcd", colored_room, "--max-error 0.005"),
-    "points_high": ("a.pcd", colored_room, "--rms 0.01 --effort high --color-error 3"),
-    "points_exact_channels": ("a.pcd", colored_room, "--rms 0.01 --color-error 0"),
+    "points_high": ("a.pcd", colored_room, "--rms 0.01 --codec points --effort high --color-error 3"),
+    "points_exact_channels": ("a.pcd", colored_room, "--rms 0.01 --codec points --color-error 0"),
     "points_tiles": ("a.pcd", colored_room, "--max-error 0.02 --tile-size 2"),
     "points_counts": ("a.pcd", crowded_room, "--max-error 0.02"),
     "points_no_counts": ("a.pcd", crowded_room, "--rms 0.02 --no-counts"),
@@ -156,7 +166,14 @@ CLOUDS = {
     "points_crowded_exact": ("a.pcd", crowded_colors, "--max-error 0.05 --color-error 0"),
     "points_pile": ("a.pcd", pile, "--max-error 0.05"),
     "points_utm": ("a.pcd", utm_room, "--max-error 0.001"),
-    "points_survey": ("a.las", survey, "--rms 0.005"),
+    "points_survey": ("a.las", survey, "--rms 0.005 --codec points"),
+    "surface_sparse": ("a.pcd", crowded_room, "--rms 0.02 --codec surface"),
+    "surface_coarse": ("a.pcd", dense_room, "--rms 0.03 --codec surface"),
+    "surface_noisy": ("a.pcd", noisy_room, "--rms 0.06 --codec surface --effort high"),
+    "surface_colors": ("a.pcd", colored_room, "--rms 0.05 --codec surface --color-error 12"),
+    "surface_tiles": ("a.pcd", colored_room, "--rms 0.05 --codec surface --channels none --tile-size 2"),
+    "surface_utm": ("a.pcd", utm_room, "--rms 0.05 --codec surface"),
+    "surface_pile": ("a.pcd", pile, "--rms 0.05 --codec surface"),
     "lossless_odd": ("a.pcd", odd_scan, "--lossless"),
     "lossless_odd_order": ("a.pcd", odd_scan, "--lossless --keep-order --effort high"),
     "lossless_text": ("a.pcd", text_scan, "--lossless"),
