@@ -17,9 +17,7 @@ constexpr int kMostTries = 12;
 constexpr std::size_t kFewPoints = 60000;                         // for the first tries
 constexpr double kRmsAim = 0.992;                                 // of the promise
 constexpr double kCloseEnough = 0.06, kCloseEnoughOnAll = 0.015;  // of the target; the rest is extrapolated
-constexpr double kLongestLeap =
-    1.1;  // of the step's logarithm: what is far away is not as the slope here says
-constexpr double kFinest = 1.0 / (1 << 20);  // of the longest side of a piece
+constexpr double kFinest = 1.0 / (1 << 20);                       // of the longest side of a piece
 constexpr double kBitsPerStep =
     1.2;  // by how much the logarithm of the size falls with that of the step, usually
 
