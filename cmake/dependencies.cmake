@@ -3,6 +3,7 @@ find_package(Threads REQUIRED)
 find_package(TBB REQUIRED)
 find_package(PkgConfig REQUIRED)
 pkg_check_modules(ZSTD REQUIRED IMPORTED_TARGET libzstd)
+find_path(XXHASH_INCLUDE_DIR xxhash.h REQUIRED)  # header only
 find_path(NANOFLANN_INCLUDE_DIR nanoflann.hpp REQUIRED)
 
 if(MAPCODEC_PAPER_ENCODER)

@@ -38,30 +38,43 @@ Status decode_info(const Commit& commit, ArchiveState& state) {
   return {};
 }
 
-/// Merges two ordered lists; an entry of `set` replaces its namesake.
-std::vector<IndexEntry> merge(std::vector<IndexEntry> old, std::vector<IndexEntry> set) {
-  std::vector<IndexEntry> out;
-  out.reserve(old.size() + set.size());
-  auto a = old.begin();
-  const TileIdLess less;
-  for (IndexEntry& entry : set) {
-    for (; a != old.end() && less(id_of(a->record), id_of(entry.record)); ++a) out.push_back(std::move(*a));
-    if (a != old.end() && id_of(a->record) == id_of(entry.record)) ++a;
-    out.push_back(std::move(entry));
-  }
-  std::move(a, old.end(), std::back_inserter(out));
-  return out;
+bool holds(const ArchiveState& state, const TileId& id) {
+  if (const auto at = state.changes.find(id); at != state.changes.end()) return at->second.has_value();
+  const auto at =
+      std::lower_bound(state.entries.begin(), state.entries.end(), id,
+                       [](const IndexEntry& e, const TileId& i) { return TileIdLess()(id_of(e.record), i); });
+  return at != state.entries.end() && id_of(at->record) == id;
 }
 
-Status remove_all(std::vector<IndexEntry>& entries, const std::vector<TileId>& removed,
-                  std::uint64_t offset) {
-  const std::size_t before = entries.size();
-  std::erase_if(entries, [&](const IndexEntry& e) {
-    return std::binary_search(removed.begin(), removed.end(), id_of(e.record), TileIdLess());
-  });
-  if (before - entries.size() != removed.size())
-    return damaged("the index removes a tile that is not there", offset);
+Status apply_delta(IndexBlock block, std::uint64_t offset, ArchiveState& state) {
+  for (const TileId& id : block.removed) {
+    if (!holds(state, id)) return damaged("the index removes a tile that is not there", offset);
+    state.changes[id] = std::nullopt;
+    --state.tiles;
+  }
+  for (IndexEntry& entry : block.set) {
+    const TileId id = id_of(entry.record);
+    state.tiles += holds(state, id) ? 0 : 1;
+    state.changes[id] = std::move(entry);
+  }
   return {};
+}
+
+/// Takes the changes into the list.
+void settle(ArchiveState& state) {
+  if (state.changes.empty()) return;
+  std::vector<IndexEntry> out;
+  out.reserve(state.tiles);
+  auto a = state.entries.begin();
+  const TileIdLess less;
+  for (auto& [id, entry] : state.changes) {
+    for (; a != state.entries.end() && less(id_of(a->record), id); ++a) out.push_back(std::move(*a));
+    if (a != state.entries.end() && id_of(a->record) == id) ++a;
+    if (entry) out.push_back(std::move(*entry));
+  }
+  std::move(a, state.entries.end(), std::back_inserter(out));
+  state.entries = std::move(out);
+  state.changes.clear();
 }
 
 }  // namespace
@@ -100,17 +113,20 @@ Status apply_commit(const Commit& commit, const DecodeLimits& limits, ArchiveSta
   MAPCODEC_TRY(decode_info(commit, state));
   auto block = decode_index(commit.index(), context_of(commit, state.info), limits);
   if (!block.ok()) return as_damage(block.error(), commit.segments_end());
+  if (!block->set.empty()) state.hashes = block->hashes;
+  const std::uint64_t tiles = block->tiles;
   if (block->delta) {
-    MAPCODEC_TRY(remove_all(state.entries, block->removed, commit.segments_end()));
-    state.entries = merge(std::move(state.entries), std::move(block->set));
+    MAPCODEC_TRY(apply_delta(std::move(block).value(), commit.segments_end(), state));
     state.delta_index_bytes += commit.record.index_bytes;
     ++state.deltas;
   } else {
+    state.changes.clear();
     state.entries = std::move(block->set);
+    state.tiles = state.entries.size();
     state.full_index_bytes = commit.record.index_bytes;
     state.delta_index_bytes = state.deltas = 0;
   }
-  if (state.entries.size() != block->tiles)
+  if (state.tiles != tiles)
     return damaged("the index holds another number of tiles than it says", commit.segments_end());
   state.record = commit.record;
   state.offset = commit.offset;
@@ -122,6 +138,7 @@ Result<ArchiveState> load_state(const TileStore& store, Commit last, const Decod
   ArchiveState state;
   for (auto commit = chain.rbegin(); commit != chain.rend(); ++commit)
     MAPCODEC_TRY(apply_commit(*commit, limits, state));
+  settle(state);
   state.info.input_points += total_points(state.entries);
   return state;
 }

@@ -2,6 +2,9 @@
 // A revision put together from its chain of commits: what readers and writers both start from.
 #pragma once
 
+#include <map>
+#include <optional>
+
 #include "maps/commit_record.hpp"
 #include "maps/index_codec.hpp"
 
@@ -14,11 +17,16 @@ struct ArchiveState {
   CommitRecord record;       ///< of the revision
   std::uint64_t offset = 0;  ///< of its record
   MapInfo info;
-  Bytes metadata;                       ///< the block that `info` came from
-  std::vector<IndexEntry> entries;      ///< all tiles, in order
+  Bytes metadata;                   ///< the block that `info` came from
+  std::vector<IndexEntry> entries;  ///< all tiles, in order, but for `changes`
+  /// What deltas set, or removed, since `entries`: so that a long chain costs its changes, not all tiles each
+  /// time. Empty after `load_state`.
+  std::map<TileId, std::optional<IndexEntry>, TileIdLess> changes;
+  std::uint64_t tiles = 0;              ///< with the changes
   std::uint64_t full_index_bytes = 0;   ///< of the full index in the chain
   std::uint64_t delta_index_bytes = 0;  ///< of the deltas after it, together
   std::uint64_t deltas = 0;             ///< their number
+  bool hashes = false;                  ///< the newest index that has tiles stores hashes
 };
 
 /// Puts together the revision that `last` ends. Errors: ArchiveDamaged (with offset), LimitExceeded,
@@ -27,7 +35,7 @@ struct ArchiveState {
                                               const DecodeLimits& limits = {});
 
 /// Turns the state of the previous commit (or an empty one) into that of `commit`. `info.input_points` stays
-/// as decoded. Errors: ArchiveDamaged (with offset), LimitExceeded.
+/// as decoded; the tiles are `entries` with `changes`. Errors: ArchiveDamaged (with offset), LimitExceeded.
 [[nodiscard]] Status apply_commit(const Commit& commit, const DecodeLimits& limits, ArchiveState& state);
 
 /// The commit before `commit`. Errors: ArchiveDamaged (missing, or its revision is not smaller).

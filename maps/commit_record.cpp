@@ -79,11 +79,13 @@ Result<Commit> check_commit(const TileStore& store, ByteSpan bytes, std::uint64_
 /// hostile bytes could make that dear: the sum is bounded.
 class BackwardSearch {
  public:
-  BackwardSearch(const TileStore& store, std::uint64_t end)
-      : store_(store), end_(end), budget_(2 * end + (kChunk << 6)) {}
+  /// @param thorough  to the beginning of the file, also past waypoints that lead nowhere.
+  BackwardSearch(const TileStore& store, std::uint64_t end, bool thorough = false)
+      : store_(store), end_(end), budget_(2 * end + (kChunk << 6)), thorough_(thorough) {}
 
   Result<Commit> run() {
-    const std::uint64_t stop = std::max<std::uint64_t>(kHeaderBytes, end_ - std::min(end_, kMaxSearchBytes));
+    const std::uint64_t most = thorough_ ? end_ : std::min(end_, kMaxSearchBytes);
+    const std::uint64_t stop = std::max<std::uint64_t>(kHeaderBytes, end_ - most);
     for (std::uint64_t high = end_; high >= stop + kRecordBytes;) {
       const std::uint64_t low = high - stop > kChunk ? high - kChunk : stop;
       MAPCODEC_ASSIGN(const Bytes chunk, store_.read(low, high - low));
@@ -113,7 +115,10 @@ class BackwardSearch {
     budget_ -= cost;
     auto commit = check_commit(store_, bytes, offset);
     if (!commit.ok()) return std::nullopt;
-    return record->waypoint ? follow(*record) : std::move(commit);
+    if (!record->waypoint) return commit;
+    auto led_to = follow(*record);
+    if (thorough_ && !led_to.ok()) return std::nullopt;
+    return led_to;
   }
 
   Result<Commit> follow(const CommitRecord& waypoint) const {
@@ -126,6 +131,7 @@ class BackwardSearch {
   const TileStore& store_;
   std::uint64_t end_;
   std::uint64_t budget_;
+  bool thorough_;
 };
 
 }  // namespace
@@ -169,6 +175,10 @@ std::array<std::uint8_t, kRecordBytes> write_record(const CommitRecord& record, 
   return bytes;
 }
 
+std::uint32_t commit_crc(std::uint64_t offset, ByteSpan blocks, ByteSpan fields) {
+  return record_crc(archive_header(), offset, blocks, fields);
+}
+
 Result<Commit> read_commit(const TileStore& store, std::uint64_t offset) {
   auto bytes = store.read(offset, kRecordBytes);
   if (!bytes.ok() && bytes.error().code == ErrorCode::kTruncated) return damaged("no commit record", offset);
@@ -187,12 +197,20 @@ Result<Commit> find_last_commit(const TileStore& store) {
   return BackwardSearch(store, end).run();
 }
 
+Result<Commit> find_commit_before(const TileStore& store, std::uint64_t end) {
+  return BackwardSearch(store, end, true).run();
+}
+
 bool ends_like_commit(const TileStore& store) {
   const auto end = store.end();
   if (!end.ok() || *end < kHeaderBytes + kRecordBytes) return false;
   const auto bytes = store.read(*end - kRecordBytes, kRecordBytes);
-  return bytes.ok() && std::equal(kRecordMagic.begin(), kRecordMagic.end(), bytes->begin()) &&
-         ((*bytes)[4] & kWaypointFlag) == 0;
+  if (!bytes.ok()) return false;
+  int alike = 0;
+  for (std::size_t i = 0; i < kRecordMagic.size(); ++i) alike += (*bytes)[i] == kRecordMagic[i] ? 1 : 0;
+  // One byte may be what was damaged. A waypoint at the end is what a killed writer leaves; its flag alone
+  // does not make one.
+  return alike >= 3 && !check_commit(store, *bytes, *end - kRecordBytes).ok();
 }
 
 }  // namespace mapcodec

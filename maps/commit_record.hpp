@@ -54,12 +54,18 @@ struct Commit {
 /// The record's bytes, for `offset`, after `blocks`.
 [[nodiscard]] std::array<std::uint8_t, kRecordBytes> write_record(const CommitRecord& record,
                                                                   std::uint64_t offset, ByteSpan blocks);
+/// The checksum of a record at `offset`. @param fields  the record without its checksum.
+[[nodiscard]] std::uint32_t commit_crc(std::uint64_t offset, ByteSpan blocks, ByteSpan fields);
 /// The commit or waypoint whose record stands at `offset`. Errors: ArchiveDamaged, Unreadable.
 [[nodiscard]] Result<Commit> read_commit(const TileStore& store, std::uint64_t offset);
 /// The last whole commit: from the end backwards, ignoring what an unfinished commit left.
 /// Errors: as check_header and read_commit; ArchiveDamaged (there is none).
 [[nodiscard]] Result<Commit> find_last_commit(const TileStore& store);
-/// True if the last bytes look like a commit record, whole or not: not what an interrupted writer leaves.
+/// The last whole commit that ends at or before `end`, searched through all of the file: for repair.
+/// Errors: ArchiveDamaged (there is none), Unreadable.
+[[nodiscard]] Result<Commit> find_commit_before(const TileStore& store, std::uint64_t end);
+/// True if the last bytes look like a damaged commit record (one byte of its magic may be wrong): not what an
+/// interrupted writer leaves.
 [[nodiscard]] bool ends_like_commit(const TileStore& store);
 
 }  // namespace mapcodec

@@ -85,9 +85,18 @@ Result<FileHandle> lock_replaced(const std::string& path, bool overwrite) {
   if (!S_ISREG(s.st_mode)) return cannot_write("is not a regular file");
   if (!overwrite) return cannot_write("exists already");
   FileHandle file(open_file(path, O_RDONLY | O_NONBLOCK));
-  if (file.is_open())
-    MAPCODEC_TRY(lock(file.fd()));  // one that we may not read cannot be locked, but may be replaced
+  if (!file.is_open()) return file;  // one that we may not read cannot be locked, but may be replaced
+  MAPCODEC_TRY(lock(file.fd()));
+  if (!still_named(file.fd(), path)) return cannot_write("another program has just replaced this archive");
   return file;
+}
+
+/// Who may read the old file may read the new one. Where that cannot be had, the new one is the stricter.
+void keep_permissions(const FileHandle& from, const FileHandle& to) {
+  struct stat s {};
+  if (!from.is_open() || ::fstat(from.fd(), &s) != 0) return;
+  [[maybe_unused]] const int owner = ::fchown(to.fd(), s.st_uid, s.st_gid);
+  [[maybe_unused]] const int mode = ::fchmod(to.fd(), s.st_mode & 0777);
 }
 
 Status write_all(int fd, ByteSpan bytes, std::uint64_t offset) {
@@ -159,6 +168,7 @@ Result<std::unique_ptr<FileStore>> FileStore::create(const std::string& path, bo
   if (!file.is_open()) return system_error(ErrorCode::kCannotWrite, "cannot be created");
   std::unique_ptr<FileStore> store(new FileStore(std::move(file), path));
   store->temporary_ = temporary;
+  keep_permissions(replaced, store->file_);
   store->replaced_ = std::move(replaced);
   store->overwrite_ = overwrite;
   store->writable_ = true;
@@ -215,6 +225,8 @@ Result<SegmentRef> FileStore::append(ByteSpan bytes) {
 }
 
 Status FileStore::publish(ByteSpan head) {
+  // A head must not reach the disk before what it speaks of. A new file has no name until all of it is there.
+  if (temporary_.empty() && end_ > published_) MAPCODEC_TRY(sync());
   MAPCODEC_TRY(write(head));
   MAPCODEC_TRY(sync());
   if (!temporary_.empty()) MAPCODEC_TRY(take_name());

@@ -145,6 +145,12 @@ void write_dead(ColumnWriter& out, const std::vector<SegmentRef>& dead, std::uin
   }
 }
 
+void write_hashes(ByteWriter& out, const std::vector<IndexEntry>& set) {
+  for (const IndexEntry& e : set) {
+    for (const ContentHash& h : e.record.hashes) out.raw(h.bytes);
+  }
+}
+
 /// Plain varints, at least five bytes a tile: a reader can hold the count against the bytes.
 void write_removed(ByteWriter& out, const std::vector<TileId>& removed) {
   TileId last;
@@ -171,9 +177,11 @@ Bytes encode_index(const IndexBlock& block, const IndexContext& context) {
   const std::uint8_t shared = write_errors(columns, block.set, to_array(context.achieved));
   write_segments(columns, all_segments(block.set), context.segments_begin);
   write_dead(columns, block.dead, context.segments_begin);
+  if (block.hashes) write_hashes(columns.body(), block.set);
 
   ByteWriter out;
-  out.u8(static_cast<std::uint8_t>((block.delta ? kIndexDelta : 0) | shared << kIndexScaleShift));
+  out.u8(static_cast<std::uint8_t>((block.delta ? kIndexDelta : 0) | (block.hashes ? kIndexHashes : 0) |
+                                   shared << kIndexScaleShift));
   out.varint(block.tiles);
   if (block.delta) {
     out.varint(block.set.size());

@@ -35,6 +35,7 @@ struct TileIdLess {
 /// All tiles, or the changes against the previous commit's.
 struct IndexBlock {
   bool delta = false;
+  bool hashes = false;          ///< content hashes are stored: every tile of `set` must have them
   std::uint64_t tiles = 0;      ///< of the map after this commit
   std::vector<IndexEntry> set;  ///< all, or the new and the changed ones; in order
   std::vector<TileId> removed;  ///< delta only; in order
@@ -59,9 +60,10 @@ struct IndexContext {
 [[nodiscard]] Result<IndexBlock> decode_index(ByteSpan bytes, const IndexContext& context,
                                               const DecodeLimits& limits = {});
 
-/// Number of tiles after the commit, and whether the block is a delta, from its first bytes.
+/// Number of tiles after the commit, and what kind of block it is, from its first bytes.
 struct IndexHead {
   bool delta = false;
+  bool hashes = false;
   std::uint64_t tiles = 0;
 };
 [[nodiscard]] Result<IndexHead> decode_index_head(ByteSpan bytes);

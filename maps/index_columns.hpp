@@ -7,7 +7,8 @@
 
 namespace mapcodec {
 
-inline constexpr std::uint8_t kIndexDelta = 1;  ///< bit of the first byte: changes, not all tiles
+inline constexpr std::uint8_t kIndexDelta = 1;   ///< bit of the first byte: changes, not all tiles
+inline constexpr std::uint8_t kIndexHashes = 2;  ///< another: the hash of every segment is stored
 inline constexpr std::uint8_t kIndexScaleShift =
     4;  ///< its bits 4..7: scale i is the metadata's achieved error
 

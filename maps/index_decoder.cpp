@@ -202,6 +202,19 @@ Result<std::vector<SegmentRef>> read_dead(ColumnReader& columns, const IndexCont
   return dead;
 }
 
+Status read_hashes(ByteReader& in, std::vector<IndexEntry>& set) {
+  for (IndexEntry& e : set) {
+    if (e.record.segments.size() > in.left() / sizeof(ContentHash::bytes))
+      return malformed("more segments than hashes", in);
+    e.record.hashes.resize(e.record.segments.size());
+    for (ContentHash& h : e.record.hashes) {
+      const ByteSpan stored = in.raw(h.bytes.size());
+      std::copy(stored.begin(), stored.end(), h.bytes.begin());
+    }
+  }
+  return {};
+}
+
 /// The fields before the columns.
 struct Front {
   std::uint8_t kind = 0;
@@ -217,7 +230,7 @@ Result<Front> read_front(ByteReader& in) {
     front.removed = in.varint();
   }
   MAPCODEC_TRY(in.status("index"));
-  if ((front.kind & 0x0E) != 0) return malformed("unknown kind", in);
+  if ((front.kind & 0x0C) != 0) return malformed("unknown kind", in);
   return front;
 }
 
@@ -260,14 +273,15 @@ Result<std::vector<TileId>> read_removed(ByteReader& in, std::uint64_t count) {
 Result<IndexHead> decode_index_head(ByteSpan bytes) {
   ByteReader in(bytes);
   MAPCODEC_ASSIGN(const Front front, read_front(in));
-  return IndexHead{(front.kind & kIndexDelta) != 0, front.tiles};
+  return IndexHead{(front.kind & kIndexDelta) != 0, (front.kind & kIndexHashes) != 0, front.tiles};
 }
 
 Result<IndexBlock> decode_index(ByteSpan bytes, const IndexContext& context, const DecodeLimits& limits) {
   ByteReader in(bytes);
   MAPCODEC_ASSIGN(const Front front, read_front(in));
   MAPCODEC_TRY(check_counts(front, in, limits));
-  IndexBlock block{(front.kind & kIndexDelta) != 0, front.tiles, {}, {}, {}};
+  IndexBlock block{
+      (front.kind & kIndexDelta) != 0, (front.kind & kIndexHashes) != 0, front.tiles, {}, {}, {}};
   MAPCODEC_ASSIGN(block.removed, read_removed(in, front.removed));
   ColumnReader columns(in, in.u16());
   MAPCODEC_TRY(in.status("index"));
@@ -283,6 +297,7 @@ Result<IndexBlock> decode_index(ByteSpan bytes, const IndexContext& context, con
   MAPCODEC_TRY(read_errors(columns, block.set, front.kind >> kIndexScaleShift, context.achieved));
   MAPCODEC_TRY(read_segments(columns, block.set, context));
   MAPCODEC_ASSIGN(block.dead, read_dead(columns, context));
+  if (block.hashes) MAPCODEC_TRY(read_hashes(in, block.set));
   if (in.left() > 0) return malformed("bytes are left over", in);
   return block;
 }

@@ -2,10 +2,12 @@
 #include "maps/map_archive.hpp"
 
 #include <algorithm>
+#include <charconv>
 
 #include "mapcodec/base/crc32c.hpp"
 #include "maps/archive_state.hpp"
 #include "maps/file_store.hpp"
+#include "maps/submap_pose.hpp"
 
 namespace mapcodec {
 
@@ -20,28 +22,75 @@ Result<MapArchive> MapArchive::open(std::unique_ptr<TileStore> store, std::optio
   MapArchive archive(std::move(store));
   MAPCODEC_ASSIGN(const std::uint64_t end, archive.store_->end());
   MAPCODEC_ASSIGN(Commit commit, find_last_commit(*archive.store_));
+  archive.newest_offset_ = commit.offset;
   archive.file_bytes_ = commit.end();
   archive.trailing_bytes_ =
       end > commit.end() ? end - commit.end() : 0;  // a writer may have grown the file since
   if (revision) {
     MAPCODEC_ASSIGN(commit, find_revision(*archive.store_, std::move(commit), *revision));
   }
-  MAPCODEC_ASSIGN(ArchiveState state, load_state(*archive.store_, std::move(commit), limits));
-  archive.info_ = std::move(state.info);
-  archive.revision_ = state.record.revision;
-  archive.timestamp_s_ = state.record.timestamp_s;
-  archive.record_offset_ = state.offset;
-  archive.tiles_.reserve(state.entries.size());
-  for (IndexEntry& entry : state.entries) archive.tiles_.push_back(std::move(entry.record));
+  MAPCODEC_TRY(archive.load(std::move(commit), limits));
   return archive;
+}
+
+Status MapArchive::load(Commit commit, const DecodeLimits& limits) {
+  MAPCODEC_ASSIGN(ArchiveState state, load_state(*store_, std::move(commit), limits));
+  info_ = std::move(state.info);
+  revision_ = state.record.revision;
+  timestamp_s_ = state.record.timestamp_s;
+  record_offset_ = state.offset;
+  tiles_.reserve(state.entries.size());
+  for (IndexEntry& entry : state.entries) tiles_.push_back(std::move(entry.record));
+  return {};
+}
+
+Result<MapArchive> MapArchive::at(std::uint64_t revision, const DecodeLimits& limits) const {
+  MapArchive archive(store_);
+  archive.newest_offset_ = newest_offset_;
+  archive.file_bytes_ = file_bytes_;
+  archive.trailing_bytes_ = trailing_bytes_;
+  MAPCODEC_ASSIGN(Commit newest, read_commit(*store_, newest_offset_));
+  MAPCODEC_ASSIGN(Commit commit, find_revision(*store_, std::move(newest), revision));
+  MAPCODEC_TRY(archive.load(std::move(commit), limits));
+  return archive;
+}
+
+Result<std::uint64_t> MapArchive::resolve(const std::string& text) const {
+  std::string names;
+  for (const Snapshot& s : info_.snapshots) {
+    if (s.name == text) return s.revision;
+    names += (names.empty() ? "" : ", ") + s.name;
+  }
+  std::uint64_t number = 0;
+  const auto [stop, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  if (!text.empty() && text.size() <= 10 && error == std::errc() && stop == text.data() + text.size())
+    return number;
+  return make_error(
+      ErrorCode::kNotFound,
+      "has no snapshot '" + text + "' (" + (names.empty() ? "there are none" : "there are: " + names) + ")");
+}
+
+bool MapArchive::lost_newest() const {
+  return trailing_bytes_ > 0 && ends_like_commit(*store_);
 }
 
 std::vector<std::size_t> MapArchive::tiles_in(const Box& box) const {
   std::vector<std::size_t> found;
+  PosedQuery query(info_, box);
   for (std::size_t i = 0; i < tiles_.size(); ++i) {
-    if (tiles_[i].bounds.intersects(box)) found.push_back(i);
+    if (query.meets(tiles_[i])) found.push_back(i);
   }
   return found;
+}
+
+Result<ContentHash> MapArchive::hash(const TileRecord& tile) const {
+  if (!tile.hashes.empty()) return hash_tile(tile.codec, tile.hashes);
+  std::vector<ContentHash> hashes;
+  for (const SegmentRef& segment : tile.segments) {
+    MAPCODEC_ASSIGN(const Bytes bytes, read(segment));
+    hashes.push_back(hash_bytes(bytes));
+  }
+  return hash_tile(tile.codec, hashes);
 }
 
 std::optional<std::size_t> MapArchive::find(const TileKey& key, std::uint32_t submap) const {
@@ -85,6 +134,11 @@ Result<std::vector<RevisionInfo>> MapArchive::log() const {
     offset = commit.record.previous;
   }
   return revisions;
+}
+
+Result<std::uint64_t> resolve_revision(const std::string& path, const std::string& text) {
+  MAPCODEC_ASSIGN(const MapArchive newest, MapArchive::open(path));
+  return newest.resolve(text);
 }
 
 std::string tile_name(const TileRecord& tile) {

@@ -14,6 +14,8 @@
 
 namespace mapcodec {
 
+struct Commit;
+
 /// What `MapArchive::verify` found.
 struct VerifyReport {
   std::vector<Error>
@@ -45,6 +47,13 @@ class MapArchive {
                                                std::optional<std::uint64_t> revision = std::nullopt,
                                                const DecodeLimits& limits = {});
 
+  /// The same archive, as it was when opened, at another of its revisions; shares the open file, so that
+  /// compaction cannot come between. Errors: as open.
+  [[nodiscard]] Result<MapArchive> at(std::uint64_t revision, const DecodeLimits& limits = {}) const;
+  /// The number that `text` means: the name of a snapshot, or a number of 1 to 10 digits (which need not
+  /// exist). Names as this revision has them. Errors: NotFound (with the names there are).
+  [[nodiscard]] Result<std::uint64_t> resolve(const std::string& text) const;
+
   [[nodiscard]] const MapInfo& info() const { return info_; }
   [[nodiscard]] std::uint64_t revision() const { return revision_; }
   [[nodiscard]] std::int64_t timestamp_s() const {
@@ -52,8 +61,8 @@ class MapArchive {
   }  ///< of the revision [s since epoch]
   /// All tiles, submap by submap, each in Morton order.
   [[nodiscard]] const std::vector<TileRecord>& tiles() const { return tiles_; }
-  /// Indices into tiles() of those whose bounds meet `box` [m, submap frame], in order. Unplaced tiles meet
-  /// none.
+  /// Indices into tiles() of those whose bounds meet `box` [m, map frame] as the poses of the submaps stand,
+  /// in order; conservative under rotation. Unplaced tiles meet none.
   [[nodiscard]] std::vector<std::size_t> tiles_in(const Box& box) const;
   /// Index of a tile; nothing if there is none.
   [[nodiscard]] std::optional<std::size_t> find(const TileKey& key, std::uint32_t submap = 0) const;
@@ -63,6 +72,11 @@ class MapArchive {
   /// Unreadable.
   [[nodiscard]] Result<Bytes> read(const SegmentRef& segment) const;
 
+  /// Of the content of a tile; read where the archive does not store its hashes. Errors: as read.
+  [[nodiscard]] Result<ContentHash> hash(const TileRecord& tile) const;
+  /// True if both are revisions of one opened file (see `at`): segments with equal places are equal.
+  [[nodiscard]] bool shares_store(const MapArchive& other) const { return store_ == other.store_; }
+
   /// Bytes read from the store since opening, the opening included.
   [[nodiscard]] std::uint64_t bytes_read() const { return store_->bytes_read(); }
   /// Size of the file up to the end of the newest whole commit at opening.
@@ -70,6 +84,8 @@ class MapArchive {
   /// Bytes after the newest whole commit at opening: an unfinished commit, of a writer at work or one that
   /// died.
   [[nodiscard]] std::uint64_t trailing_bytes() const { return trailing_bytes_; }
+  /// True if those bytes end like a commit that was whole once: a newer revision was damaged.
+  [[nodiscard]] bool lost_newest() const;
 
   /// Reads the whole file: all commits, all their segments and dead ranges. Any flipped bit is found.
   /// Errors: Unreadable. What is wrong with the bytes stands in the report.
@@ -78,20 +94,25 @@ class MapArchive {
   [[nodiscard]] Result<std::vector<RevisionInfo>> log() const;
 
  private:
-  explicit MapArchive(std::unique_ptr<TileStore> store) : store_(std::move(store)) {}
+  explicit MapArchive(std::shared_ptr<const TileStore> store) : store_(std::move(store)) {}
+  [[nodiscard]] Status load(Commit commit, const DecodeLimits& limits);
   [[nodiscard]] std::string owner_of(const SegmentRef& segment) const;
 
-  std::unique_ptr<TileStore> store_;
+  std::shared_ptr<const TileStore> store_;
   MapInfo info_;
   std::uint64_t revision_ = 0, record_offset_ = 0;
   std::int64_t timestamp_s_ = 0;
-  std::uint64_t file_bytes_ = 0, trailing_bytes_ = 0;
+  std::uint64_t file_bytes_ = 0, trailing_bytes_ = 0, newest_offset_ = 0;
   std::vector<TileRecord> tiles_;
 };
 
 /// Verifies what stands at `path`, also if it cannot be opened: then the report's only finding says why.
 /// Errors: NotFound, Unreadable, Empty, Malformed (not an archive), Unsupported.
 [[nodiscard]] Result<VerifyReport> verify_archive(const std::string& path);
+
+/// The revision of the archive at `path` that `text` means (`MapArchive::resolve`). Errors: as open;
+/// NotFound.
+[[nodiscard]] Result<std::uint64_t> resolve_revision(const std::string& path, const std::string& text);
 
 /// "(x, y, z) of level l", with the submap if it is not the first.
 [[nodiscard]] std::string tile_name(const TileRecord& tile);

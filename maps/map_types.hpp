@@ -13,6 +13,7 @@
 #include "mapcodec/cloud/tile_key.hpp"
 #include "mapcodec/cloud/vec3.hpp"
 #include "mapcodec/codec/tile_codec.hpp"
+#include "maps/content_hash.hpp"
 
 namespace mapcodec {
 
@@ -38,6 +39,7 @@ struct TileRecord {
                       ///< unplaced
   TileErrors errors;  ///< rounded up by at most 1/32 of the map's largest, never beyond it
   std::vector<SegmentRef> segments;  ///< the base, then deltas in the order in which they apply
+  std::vector<ContentHash> hashes;   ///< of the segments; empty where the archive does not store them
 };
 
 /// Tiles are stored submap by submap, each in Morton order.

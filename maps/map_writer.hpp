@@ -3,10 +3,13 @@
 #pragma once
 
 #include <memory>
+#include <span>
 #include <string>
+#include <vector>
 
 #include "mapcodec/base/result.hpp"
 #include "maps/map_types.hpp"
+#include "maps/submap_pose.hpp"
 #include "maps/tile_store.hpp"
 
 namespace mapcodec {
@@ -51,6 +54,37 @@ class MapWriter {
   [[nodiscard]] std::size_t tile_count() const;
   /// Facts of the next revision. Errors: InvalidArgument (as create; or origin or tile size differ).
   [[nodiscard]] Status set_info(MapInfo info);
+
+  /// Number of the last committed revision; 0: none yet.
+  [[nodiscard]] std::uint64_t revision() const;
+  /// The tiles as the next commit will have them, in order. Pointers are good until the tile is changed.
+  [[nodiscard]] std::vector<const TileRecord*> tiles() const;
+  /// Those whose bounds meet `box` [m, map frame] as the poses stand.
+  [[nodiscard]] std::vector<const TileRecord*> tiles_in(const Box& box) const;
+  /// nullptr: there is none. Good until the tile is changed.
+  [[nodiscard]] const TileRecord* find(const TileKey& key, std::uint32_t submap = 0) const;
+  /// The bytes of a segment, committed or not, checked. Errors: ChecksumMismatch, ArchiveDamaged, Unreadable.
+  [[nodiscard]] Result<Bytes> read(const SegmentRef& segment) const;
+  /// A box around the bounds of all tiles as the poses stand [m, map frame]; empty without placed tiles.
+  [[nodiscard]] Box posed_bounds() const;
+
+  /// Moves submaps; the map's bounds follow (`posed_bounds`). No tile is touched: the commit holds the table
+  /// of submaps. All or none are changed.
+  /// Errors: InvalidArgument (no such submap, NaN, a quaternion not of length 1 within 1e-6).
+  [[nodiscard]] Status set_poses(std::span<const PoseChange> changes);
+  /// Names the last committed revision. The name becomes good with the next commit.
+  /// Errors: InvalidArgument (name empty, longer than 255 bytes, of digits only, with control characters, or
+  /// taken; nothing committed yet).
+  [[nodiscard]] Status add_snapshot(const std::string& name);
+  /// Errors: NotFound.
+  [[nodiscard]] Status remove_snapshot(const std::string& name);
+  /// Tiles and facts become those of `revision`, but for the snapshots, which stay. No tile is written.
+  /// Errors: NotFound (no such revision, or compaction dropped it), InvalidArgument (changes not committed),
+  /// ArchiveDamaged, Unreadable.
+  [[nodiscard]] Status restore(std::uint64_t revision);
+  /// From now on indexes store content hashes, as far as those of all their segments are known; archives that
+  /// have them keep them without asking. Compaction fills in the missing ones.
+  void store_hashes(bool store);
 
   /// Ends the revision: after it returns, it is on the disk and what new readers see.
   /// @param timestamp_s  [s since epoch], 0 .. 2^40 - 1; the archive never asks a clock.

@@ -306,6 +306,7 @@ def read_index(commit, metadata):
             length = r.varint()
             dead.append((offset, length, r.uint(4)))
             expected = offset + length
+    hashes = [r.raw(16).hex() for _ in range(segment_count)] if kind & 2 else None
     if r.left():
         raise Damaged("bytes are left over after the index")
 
@@ -315,7 +316,8 @@ def read_index(commit, metadata):
                 "codec": codec[i], "points": points[i], "reach": reach[i],
                 "axis": [axes[d][i] ^ FULL_CUBE for d in range(3)],
                 "errors": [tile_error(scale[e], codes[e][i]) for e in range(4)],
-                "segments": segments[used : used + extra[i] + 1]}
+                "segments": segments[used : used + extra[i] + 1],
+                "hashes": hashes[used : used + extra[i] + 1] if hashes else None}
         used += extra[i] + 1
         tile["bounds"] = tile_bounds(tile, metadata)
         tiles[(submap[i], level[i], *(xyz[d][i] for d in range(3)))] = tile
@@ -362,6 +364,10 @@ def tile_line(tile):
             f"points {tile['points']} errors {errors} segments {segments}")
 
 
+def hash_line(tile):
+    return f"hashes {tile['submap']} {tile['level']} {tile['x']} {tile['y']} {tile['z']} {' '.join(tile['hashes'])}"
+
+
 def listing(file, options):
     version = check_header(file)
     shown, lines = None, []
@@ -378,6 +384,7 @@ def listing(file, options):
                  f"input_points {metadata['more_input_points'] + points}")
     if options.tiles:
         lines += [tile_line(t) for t in tiles.values()]
+        lines += [hash_line(t) for t in tiles.values() if t["hashes"]]
     trailing = len(file) - last_commit(file).offset - RECORD_BYTES
     if trailing:
         raise Damaged(f"{trailing} bytes after the last whole commit")

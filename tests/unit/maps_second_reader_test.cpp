@@ -26,6 +26,13 @@ std::string tile_line(const TileRecord& t) {
   return line;
 }
 
+std::string hash_line(const TileRecord& t) {
+  std::string line =
+      print("hashes %u %u %d %d %d", t.submap, unsigned{t.key.level}, t.key.x, t.key.y, t.key.z);
+  for (const ContentHash& h : t.hashes) line += " " + h.to_string();
+  return line;
+}
+
 void write_sample(const std::string& path) {
   MapInfo info = sample_info();
   std::mt19937_64 random(6);
@@ -47,6 +54,7 @@ void write_sample(const std::string& path) {
   ASSERT_TRUE(writer->extend(tiles[20].key, 5, tiles[20].bounds, tiles[20].errors, random_bytes(10, 1)).ok());
   ASSERT_TRUE(writer->add({1, 2, 3, 0}, 7, 8, {}, {}, random_bytes(10, 2), 1).ok());
   ASSERT_TRUE(writer->commit(1'700'000'500).ok());
+  writer->store_hashes(true);
   const Bytes big = random_bytes(700000, 3);  // long enough for waypoints
   for (int i = 0; i < 4; ++i) ASSERT_TRUE(writer->add({i, 3, 3, 0}, 1, 1, {}, {}, big).ok());
   ASSERT_TRUE(writer->commit(1'700'000'600).ok());
@@ -75,6 +83,11 @@ TEST(SecondReader, WriteSample) {
                 info.tile_size_m)
        << " input_points " << info.input_points << '\n';
   for (const TileRecord& t : archive->tiles()) list << tile_line(t) << '\n';
+  std::size_t hashed = 0;
+  for (const TileRecord& t : archive->tiles()) {
+    if (!t.hashes.empty()) list << hash_line(t) << '\n', ++hashed;
+  }
+  EXPECT_EQ(hashed, 4u);
 }
 
 }  // namespace
