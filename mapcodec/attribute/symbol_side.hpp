@@ -33,6 +33,7 @@ class SymbolReader {
   bool bit(bool, BitModel& m) { return in_.decode(m); }
   std::uint64_t raw(std::uint64_t, int count) { return in_.decode_raw(count); }
   [[nodiscard]] bool ok() const { return in_.ok(); }
+  [[nodiscard]] std::size_t left() const { return in_.left(); }  ///< bytes not read yet
 
  private:
   RangeDecoder in_;

@@ -16,14 +16,20 @@ inline constexpr unsigned kAllSurfaceLevels = ~0u;
 /// @param bytes    may be hostile.
 /// @param count    points that the tile's header declares.
 /// @param lattice  step_m is the surface step; points lie on a lattice of a 512th of it.
-/// @param levels   binary levels of the tree to decode (three halve a cell on all axes): what is divided
-/// further is
-///                 spread over its surface as it stands there, with the same number of points. Fewer are
-///                 faster. Channels only fit all of them.
+/// @param levels   binary levels of the tree to decode, rounded down to thirds (three halve a cell on all
+///                 axes): cells that are divided further are spread over their surface as it stands there, or
+///                 one through the occupied cells around, with the same number of points. Fewer are faster
+///                 and need fewer bytes (surface_level_bytes). Channels only fit all of them.
 /// @return `voxels` in Morton order, equal ones adjacent; empty if the tile was written without (no
 /// channels). Errors: Truncated, Malformed, LimitExceeded. Threads: pure.
 [[nodiscard]] Result<DecodedPoints> decode_surface(ByteSpan bytes, std::uint64_t count,
                                                    const Quantizer& lattice, const DecodeLimits& limits,
                                                    unsigned levels = kAllSurfaceLevels);
+
+/// How many bytes, from the first, decode_surface needs for 0, 3, 6, ... levels: never falling, and the last
+/// number is enough for all further levels. Takes decoding the tree without its points.
+/// Arguments, errors, threads: as above.
+[[nodiscard]] Result<std::vector<std::uint64_t>> surface_level_bytes(ByteSpan bytes, std::uint64_t count,
+                                                                     const DecodeLimits& limits = {});
 
 }  // namespace mapcodec

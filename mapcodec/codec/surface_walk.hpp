@@ -76,6 +76,7 @@ class Walk {
           code_cell(i, level % 3);
         }
       }
+      if constexpr (requires { side_.end_level(); }) side_.end_level();
       // Every cell holds a point: more of them come only from damaged bytes.
       if (last || next_.size() > count) break;
       link_children(level % 3);

@@ -15,10 +15,20 @@
 namespace mapcodec {
 
 /// First byte of every tile payload (FORMAT.md 3). Ids are never reused.
-enum class CodecId : std::uint8_t { lossless = 1, points = 2, paper = 3, surface = 4, occupancy = 5 };
+/// `erasure` and `joined` are no codecs: see tile_segments.hpp.
+enum class CodecId : std::uint8_t {
+  lossless = 1,
+  points = 2,
+  paper = 3,
+  surface = 4,
+  occupancy = 5,
+  erasure = 6,
+  joined = 7
+};
 [[nodiscard]] constexpr const char* codec_name(CodecId id) {
-  constexpr const char* kNames[] = {"?", "lossless", "points", "paper", "surface", "occupancy"};
-  return kNames[static_cast<std::size_t>(id) <= 5 ? static_cast<std::size_t>(id) : 0];
+  constexpr const char* kNames[] = {"?",       "lossless",  "points",  "paper",
+                                    "surface", "occupancy", "erasure", "updated"};
+  return kNames[static_cast<std::size_t>(id) <= 7 ? static_cast<std::size_t>(id) : 0];
 }
 
 /// Speed against size at the same promise.
@@ -32,12 +42,12 @@ struct PaperSettings {
   std::uint32_t outlier_k =
       5;  ///< a point with fewer neighbours than this within outlier_radius_m is isolated
   double outlier_radius_m = 0.2;
-  std::uint32_t clusters = 1;    ///< K of K-means on colour
-  double alpha_m = 0.15;         ///< radius of the alpha shape; smaller: more detail
-  double rel_area = 1;           ///< least points per square metre of a kept triangle
+  std::uint32_t clusters = 1;  ///< K of K-means on colour
+  double alpha_m = 0.15;       ///< radius of the alpha shape; smaller: more detail
+  double rel_area = 1;         ///< least points per square metre of a kept triangle
   double outside_density = 0;  ///< a triangle outside the outline needs this share of the density at its
-                                 ///< cluster's median point, too (the paper: 0)
-  double reduction_m = 0.02;     ///< contour reduction: largest distance of a left-out vertex to the outline
+                               ///< cluster's median point, too (the paper: 0)
+  double reduction_m = 0.02;   ///< contour reduction: largest distance of a left-out vertex to the outline
   double leftover_step_m = 0.002;  ///< voxel side of the remaining points (entropy-coded form)
   bool raw = false;                ///< store as the paper did (floats), to compare its own ratio
 };

@@ -2,65 +2,23 @@
 // Tile payload to points: the header, then the geometry section, then one section per stored channel
 // (FORMAT.md 3).
 #include "mapcodec/attribute/channel_decoder.hpp"
-#include "mapcodec/base/byte_reader.hpp"
 #include "mapcodec/codec/lossless_decoder.hpp"
 #include "mapcodec/codec/paper_decoder.hpp"
 #include "mapcodec/codec/points_decoder.hpp"
 #include "mapcodec/codec/surface_decoder.hpp"
 #include "mapcodec/codec/tile_codec.hpp"
 #include "mapcodec/codec/tile_sections.hpp"
+#include "mapcodec/codec/tile_segments.hpp"
 
 namespace mapcodec {
 namespace {
-
-struct Sections {
-  TileHeader header;
-  double step_m = 0;
-  ByteSpan geometry;
-  std::vector<ByteSpan> channels;  ///< one per coded channel, in schema order
-};
-
-Result<TileHeader> read_header(ByteReader& in, std::uint8_t& flags) {
-  TileHeader h;
-  h.codec = static_cast<CodecId>(in.u8());
-  flags = in.u8();
-  h.points = in.varint();
-  MAPCODEC_TRY(in.status("tile header"));
-  if (h.codec < CodecId::lossless || h.codec > CodecId::surface) {
-    return make_error(ErrorCode::kUnknownCodec,
-                      "tile codec " + std::to_string(int(h.codec)) + " is not known here", 0);
-  }
-  if ((flags & ~kTileFlagOwnStep) != 0)
-    return make_error(ErrorCode::kMalformed, "tile header has unknown flags", 1);
-  return h;
-}
-
-Result<Sections> read_sections(ByteSpan bytes, const MapSchema& schema, const DecodeLimits& limits) {
-  ByteReader in(bytes);
-  Sections s;
-  std::uint8_t flags = 0;
-  MAPCODEC_ASSIGN(s.header, read_header(in, flags));
-  if (s.header.points > limits.max_points) {
-    return make_error(ErrorCode::kLimitExceeded,
-                      "tile announces " + std::to_string(s.header.points) + " points", 2);
-  }
-  s.step_m = (flags & kTileFlagOwnStep) != 0 ? in.f64() : schema.step_m;
-  MAPCODEC_TRY(in.status("tile header"));
-  const std::size_t coded = coded_channels(schema, s.header.codec).size();
-  // The last section has no length: it is what is left.
-  s.geometry = coded == 0 ? in.raw(in.left()) : in.sized();
-  for (std::size_t i = 0; i < coded; ++i)
-    s.channels.push_back(i + 1 == coded ? in.raw(in.left()) : in.sized());
-  MAPCODEC_TRY(in.status("tile sections"));
-  return s;
-}
 
 struct Geometry {
   std::vector<Vec3> xyz;
   std::vector<VoxelCoord> voxels;
 };
 
-Result<Geometry> decode_geometry(const Sections& s, const MapSchema& schema, const DecodeLimits& limits) {
+Result<Geometry> decode_geometry(const TileSections& s, const MapSchema& schema, const DecodeLimits& limits) {
   if (s.header.codec == CodecId::lossless) {
     MAPCODEC_ASSIGN(LosslessDecoded d,
                     decode_lossless(s.geometry, s.header.points, schema.coordinates, schema.origin, limits));
@@ -78,7 +36,7 @@ Result<Geometry> decode_geometry(const Sections& s, const MapSchema& schema, con
   return Geometry{std::move(d.xyz), std::move(d.voxels)};
 }
 
-Result<PointCloud> decode_with_channels(const Sections& s, const MapSchema& schema,
+Result<PointCloud> decode_with_channels(const TileSections& s, const MapSchema& schema,
                                         const DecodeLimits& limits) {
   MAPCODEC_ASSIGN(Geometry g, decode_geometry(s, schema, limits));
   PointCloud cloud;
@@ -103,14 +61,13 @@ Result<PointCloud> decode_with_channels(const Sections& s, const MapSchema& sche
 
 }  // namespace
 
-Result<TileHeader> read_tile_header(ByteSpan bytes) {
-  ByteReader in(bytes);
-  std::uint8_t flags = 0;
-  return read_header(in, flags);
-}
-
 Result<PointCloud> decode_tile(ByteSpan bytes, const MapSchema& schema, const DecodeLimits& limits) {
-  MAPCODEC_ASSIGN(const Sections s, read_sections(bytes, schema, limits));
+  if (is_joined(bytes)) {
+    return decode_segments(bytes, schema.layout(), limits, [&](ByteSpan segment, const DecodeLimits& left) {
+      return decode_tile(segment, schema, left);
+    });
+  }
+  MAPCODEC_ASSIGN(const TileSections s, read_tile_sections(bytes, schema, limits));
   if (s.header.codec == CodecId::paper) return decode_paper(s.geometry, s.header.points, schema, limits);
   return decode_with_channels(s, schema, limits);
 }

@@ -8,6 +8,8 @@ namespace mapcodec {
 
 inline constexpr std::uint8_t kTileFlagOwnStep =
     1;  ///< a float64 voxel side follows, instead of schema.step_m
+/// Coded quickly by an update, to be folded later; a decoder need not care.
+inline constexpr std::uint8_t kTileFlagPending = 2;
 
 /// Indices of the channels of `schema` that have a section of their own in a tile of this codec: those kept
 /// exactly or within a bound. A `paper` tile carries its colour inside the geometry section.
@@ -20,5 +22,21 @@ inline constexpr std::uint8_t kTileFlagOwnStep =
   }
   return r;
 }
+
+/// A payload taken apart; the spans look into it.
+struct TileSections {
+  TileHeader header;
+  double step_m = 0;  ///< the tile's own, else schema.step_m
+  ByteSpan geometry;
+  std::vector<ByteSpan> channels;  ///< one per coded channel, in schema order
+};
+
+/// @param bytes  may be hostile. Errors: Truncated, Malformed, LimitExceeded, UnknownCodec.
+[[nodiscard]] Result<TileSections> read_tile_sections(ByteSpan bytes, const MapSchema& schema,
+                                                      const DecodeLimits& limits);
+
+/// Of the first bytes of a payload: its geometry section, cut short or not, and no channel. Errors: as above.
+[[nodiscard]] Result<TileSections> read_tile_prefix(ByteSpan bytes, const MapSchema& schema,
+                                                    const DecodeLimits& limits);
 
 }  // namespace mapcodec

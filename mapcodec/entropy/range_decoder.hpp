@@ -42,6 +42,8 @@ class RangeDecoder {
   /// False once the code was read so far past its end that it cannot be what the encoder wrote.
   /// Check it inside every loop whose length the code itself decides.
   [[nodiscard]] bool ok() const { return assumed_ <= kAssumedLimit; }
+  /// Bytes not read yet.
+  [[nodiscard]] std::size_t left() const { return left_; }
 
  private:
   static constexpr std::uint64_t kRenormalise = std::uint64_t{1} << 32;
