@@ -7,6 +7,7 @@
 #include <filesystem>
 
 #include "parallel/encode_pipeline.hpp"
+#include "parallel/runner.hpp"
 #include "parallel/tile_plan.hpp"
 #include "slam_adapter/schema_choice.hpp"
 
@@ -110,6 +111,7 @@ Status CompressJob::make_tiles() {
   survey_.cloud.reset();
   if (!tiles.ok()) return tiles.error();
   tiles_ = std::make_unique<TileSet>(std::move(tiles).value());
+  levels_ = std::make_unique<LevelSampler>(*tiles_);
   return {};
 }
 
@@ -250,6 +252,7 @@ Status CompressJob::encode_once() {
   bounds_ = {};
   report_.geometry_bytes = 0;
   report_.tile_seconds.clear();
+  levels_->clear();
   schema_.step_m = choice_.plan.step_m;
   MapInfo info;
   info.schema = write_schema(schema_);
@@ -285,6 +288,7 @@ Result<EncodedTile> CompressJob::encode(const PointCloud& tile, const MapSchema&
 
 Status CompressJob::store(const TileKey& key, EncodedTile&& t) {
   coded_.add(t);
+  levels_->keep(key, t);
   codecs_.emplace(key, t.codec);
   bounds_.add(t.bounds);
   report_.geometry_bytes += t.geometry_bytes;
@@ -301,6 +305,9 @@ Status CompressJob::commit() {
   info.dropped_points = survey_.dropped;
   info.achieved = coded_.errors();
   info.bounds = bounds_;
+  TbbRunner runner(arena_);
+  MAPCODEC_ASSIGN(const LevelErrors levels, levels_->measure(schema_, runner));
+  if (levels.levels.size() > 1) info.extras[kLevelsExtra] = write_level_errors(levels);
   MAPCODEC_TRY(writer_->set_info(std::move(info)));
   // No clock in the archive of a new map: the same input gives the same bytes.
   const auto revision = writer_->commit(0);

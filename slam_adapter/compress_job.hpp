@@ -11,6 +11,7 @@
 #include "parallel/survey.hpp"
 #include "parallel/tile_set.hpp"
 #include "slam_adapter/compress.hpp"
+#include "slam_adapter/level_errors.hpp"
 #include "slam_adapter/log_secant.hpp"
 #include "slam_adapter/plan_choice.hpp"
 
@@ -54,6 +55,7 @@ class CompressJob {
   TilePlan plan_;
   MapSchema schema_;
   std::unique_ptr<TileSet> tiles_;
+  std::unique_ptr<LevelSampler> levels_;
   std::unique_ptr<MapWriter> writer_;
   PlanChoice choice_;
   CodedSum coded_;

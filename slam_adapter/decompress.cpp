@@ -33,7 +33,7 @@ std::uint64_t points_of_tiles(const MapFile& map, const Region& region) {
 Status write_at_once(const MapFile& map, const std::string& path, const Region& region,
                      const ReadSettings& settings, const WriteOptions& write, Clock::time_point begin,
                      DecompressReport& report) {
-  PointCloud cloud = map.schema().layout();
+  PointCloud cloud = map.layout(settings);
   MAPCODEC_TRY(map.read(region, settings, [&](PointCloud&& tile) {
     if (cloud.empty() && !tile.empty()) report.first_point_seconds = seconds_since(begin);
     cloud.append(tile);
@@ -52,8 +52,7 @@ Status write_tiles(const MapFile& map, const std::string& path, const Region& re
                    DecompressReport& report) {
   MAPCODEC_ASSIGN(const std::uint64_t count, map.count(region, settings));
   if (count == 0) return make_error(ErrorCode::kEmpty, "no point lies in the asked region");
-  MAPCODEC_ASSIGN(const std::unique_ptr<PointSink> sink,
-                  open_sink(path, map.schema().layout(), count, write));
+  MAPCODEC_ASSIGN(const std::unique_ptr<PointSink> sink, open_sink(path, map.layout(settings), count, write));
   MAPCODEC_TRY(map.read(region, settings, [&](PointCloud&& cloud) -> Status {
     if (report.points == 0 && !cloud.empty()) report.first_point_seconds = seconds_since(begin);
     report.points += cloud.size();
@@ -70,8 +69,10 @@ Result<DecompressReport> decompress(const std::string& map_path, const std::stri
   const auto begin = Clock::now();
   DecompressReport report;
   MAPCODEC_ASSIGN(const MapFile map, MapFile::open(map_path, revision));
-  const bool at_once =
-      keeps_order(map.schema()) || (!region.everything() && points_of_tiles(map, region) <= kAtOnce);
+  if (settings.level && !map.has_levels())
+    return make_error(ErrorCode::kUnsupported, "has no tile with levels of detail (surface or points)");
+  const bool at_once = (!settings.level && keeps_order(map.schema())) ||
+                       (!region.everything() && points_of_tiles(map, region) <= kAtOnce);
   MAPCODEC_TRY((at_once ? write_at_once : write_tiles)(map, path, region, settings, write, begin, report));
   report.tiles_read = map.tiles_in(region).size();
   report.bytes_read = map.archive().bytes_read();
