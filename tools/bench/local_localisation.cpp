@@ -1,0 +1,261 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Localisation in compressed maps against localisation in the same map uncompressed.
+#include <spdlog/fmt/fmt.h>
+
+#include <algorithm>
+#include <filesystem>
+
+#include "mapcodec/cloud/cloud_source.hpp"
+#include "slam_adapter/compress.hpp"
+#include "slam_adapter/formats/byte_stream.hpp"
+#include "slam_adapter/formats/scan_folder.hpp"
+#include "tools/bench/local.hpp"
+#include "tools/examples/registration.hpp"
+
+namespace mapcodec::bench {
+namespace {
+
+using Eigen::Isometry3d;
+using examples::Partner;
+using examples::Registration;
+
+/// The first scan is the map's frame; those between are put into the map where they fit the first, and the
+/// last is localised. Guesses of T_first_scan: x, y, z [m], yaw [degrees].
+struct Sequence {
+  const char* name;
+  std::vector<const char*> scans;
+  std::vector<std::array<double, 4>> guesses;
+  double reach_m;
+};
+const std::vector<Sequence> kSequences{
+    {"3DTK corridor", {"dat/scan000.3d", "dat/scan001.3d", "dat/scan002.3d"}, {}, 1.0},
+    {"room (PCL)", {"room_scan1.pcd", "room_scan2.pcd"}, {{0, 0, 0, 0}, {1.79387, 0.720047, 0, 39.7}}, 1.0},
+    {"street (small_gicp)", {"small_gicp/data/target.ply", "small_gicp/data/source.ply"}, {}, 1.5},
+    {"room (libpointmatcher)", {"icp_tutorial/cloud_0.vtk", "icp_tutorial/cloud_1.vtk"}, {}, 1.0},
+    {"car (libpointmatcher)",
+     {"data/cloud.00000.vtk", "data/cloud.00001.vtk", "data/cloud.00002.vtk"},
+     {},
+     2.0}};
+
+struct MapKind {
+  const char* name;
+  PromiseKind promise;
+  double promise_m;
+  CodecChoice codecs;
+};
+constexpr MapKind kKinds[] = {{"raw", PromiseKind::lossless, 0, CodecChoice::cheapest},
+                              {"--rms 0.01", PromiseKind::rms, 0.01, CodecChoice::cheapest},
+                              {"--rms 0.01 surface", PromiseKind::rms, 0.01, CodecChoice::surface},
+                              {"--max-error 0.005", PromiseKind::max_error, 0.005, CodecChoice::cheapest}};
+
+enum class Method { planes, gicp, patches };
+constexpr const char* kMethodNames[] = {"planes of points", "GICP", "stored patches"};
+
+struct Outcome {
+  Registration registration;
+  double load_ms = 0, seconds = 0;
+  std::uint64_t peak = 0, held = 0;
+};
+
+Result<std::vector<Vec3>> finite_points(const BenchSettings& settings, const char* part) {
+  MAPCODEC_ASSIGN(BenchCloud cloud, load_named(settings, part));
+  // Some sensors write 0 0 0 where nothing came back.
+  std::erase_if(cloud.cloud.xyz, [](const Vec3& p) { return !is_finite(p) || p == Vec3{0, 0, 0}; });
+  return std::move(cloud.cloud.xyz);
+}
+
+Isometry3d pose_of(const std::array<double, 4>& g) {
+  Isometry3d t = Isometry3d::Identity();
+  t.translate(Eigen::Vector3d(g[0], g[1], g[2]));
+  t.rotate(Eigen::AngleAxisd(g[3] * 3.14159265358979323846 / 180, Eigen::Vector3d::UnitZ()));
+  return t;
+}
+
+/// 3DTK's pose beside a scan, [m]; nothing where there is none.
+std::optional<Isometry3d> pose_beside(const std::string& path) {
+  const auto stream = file_stream(std::filesystem::path(path).replace_extension(".pose").string());
+  if (!stream.ok()) return std::nullopt;
+  const auto pose = read_scan_pose(**stream);
+  if (!pose.ok()) return std::nullopt;
+  Isometry3d t = Isometry3d::Identity();
+  for (int r = 0; r < 3; ++r) {
+    const auto row = static_cast<std::size_t>(r);
+    for (int c = 0; c < 3; ++c) t.linear()(r, c) = pose->rows[row][static_cast<std::size_t>(c)];
+    t.translation()(r) = 0.01 * pose->translation[row];
+  }
+  return t;
+}
+
+Result<Outcome> localise(LocalBench& b, const std::vector<Vec3>& scan, const Isometry3d& guess, Method method,
+                         double reach_m) {
+  LocalMapSettings s;
+  s.radius_m = 100;
+  s.memory_bytes = 1'000'000'000;
+  s.ahead_s = 0;
+  s.content.patches = method == Method::patches;
+  s.content.points = !s.content.patches;
+  const double begin = wall_s();
+  MAPCODEC_ASSIGN(const auto map, LocalMap::open(b.report.scratch(), s, b.arena));
+  MAPCODEC_TRY(map->move_to(examples::to_pose(guess)));
+  MAPCODEC_ASSIGN(const bool ready, map->wait_ready(60));
+  if (!ready) return make_error(ErrorCode::kCancelled, "not loaded in a minute");
+  const auto view = map->view();
+  examples::RegistrationSettings r;
+  r.reach_m = reach_m;
+  Outcome o;
+  const double loaded = wall_s();
+  MAPCODEC_ASSIGN(
+      o.registration,
+      method == Method::gicp
+          ? examples::register_gicp(scan, *view, guess, r)
+          : examples::register_to_planes(scan, *view, guess,
+                                         method == Method::planes ? Partner::points : Partner::patches, r));
+  o.seconds = wall_s() - loaded;
+  o.load_ms = 1e3 * (loaded - begin);
+  o.peak = map->memory().peak;
+  o.held = view->bytes();
+  return o;
+}
+
+class Localisation {
+ public:
+  explicit Localisation(LocalBench& bench) : b_(bench) {}
+
+  Status run(const Sequence& sequence) {
+    b_.settings.say(fmt::format("localisation: {}", sequence.name));
+    MAPCODEC_TRY(read(sequence));
+    Isometry3d last = Isometry3d::Identity();
+    for (std::size_t i = 1; i < scans_.size(); ++i) {
+      const Isometry3d guess = guess_of(sequence, i);
+      if (i + 1 == scans_.size()) {
+        last = guess;
+        break;
+      }
+      MAPCODEC_TRY(write_map(kKinds[0]));
+      MAPCODEC_ASSIGN(const Outcome o, localise(b_, scans_[i], guess, Method::planes, sequence.reach_m));
+      add(scans_[i], o.registration.T_map_scan);
+    }
+    b_.print("");
+    b_.print(fmt::format("{}: {} points in the map, {} in the scan", sequence.name, map_.size(),
+                         scans_.back().size()));
+    b_.print(fmt::format("{:>19} {:>9} {:>17} {:>8} {:>8} {:>7} {:>8} {:>9} {:>8} {:>8}", "map", "kB",
+                         "method", "mm", "mrad", "load ms", "s", "matched", "held MB", "peak MB"));
+    return measure(sequence, last);
+  }
+
+ private:
+  Status read(const Sequence& sequence) {
+    scans_.clear();
+    paths_.clear();
+    map_ = {};
+    for (const char* part : sequence.scans) {
+      MAPCODEC_ASSIGN(const BenchCloud cloud, load_named(b_.settings, part));
+      paths_.push_back(cloud.path);
+      MAPCODEC_ASSIGN(std::vector<Vec3> points, finite_points(b_.settings, part));
+      scans_.push_back(std::move(points));
+    }
+    map_.xyz = scans_.front();
+    return {};
+  }
+
+  Isometry3d guess_of(const Sequence& sequence, std::size_t i) const {
+    if (i < sequence.guesses.size()) return pose_of(sequence.guesses[i]);
+    const auto first = pose_beside(paths_.front()), here = pose_beside(paths_[i]);
+    return first && here ? first->inverse() * *here : Isometry3d::Identity();
+  }
+
+  void add(const std::vector<Vec3>& scan, const Isometry3d& T_map_scan) {
+    for (const Vec3& p : scan) {
+      const Eigen::Vector3d q = T_map_scan * Eigen::Vector3d(p[0], p[1], p[2]);
+      // As a float32 file would hold it, so that "raw" is what a point file is.
+      map_.xyz.push_back({double(float(q[0])), double(float(q[1])), double(float(q[2]))});
+    }
+  }
+
+  Status write_map(const MapKind& kind) {
+    CompressOptions o;
+    o.promise = kind.promise;
+    o.promise_m = kind.promise_m;
+    o.codecs = kind.codecs;
+    o.overwrite = true;
+    o.channels = {"none"};
+    o.threads = b_.arena.threads();
+    for (Vec3& p : map_.xyz)
+      for (double& x : p) x = double(float(x));
+    CloudSource source(map_);
+    const auto done = compress(source, b_.report.scratch(), o);
+    return done.ok() ? Status{} : Status(done.error());
+  }
+
+  Status measure(const Sequence& sequence, const Isometry3d& guess) {
+    std::optional<Isometry3d> truth[2];
+    for (const MapKind& kind : kKinds) {
+      MAPCODEC_TRY(write_map(kind));
+      const bool raw = kind.promise == PromiseKind::lossless, surface = kind.codecs == CodecChoice::surface;
+      for (const Method method : {Method::planes, Method::gicp, Method::patches}) {
+        if ((method == Method::gicp && !examples::has_gicp()) || (method == Method::patches && !surface))
+          continue;
+        const auto o = localise(b_, scans_.back(), guess, method, sequence.reach_m);
+        std::optional<Isometry3d>& reference = truth[method == Method::gicp ? 1 : 0];
+        if (raw && o.ok()) reference = o->registration.T_map_scan;
+        show(sequence, kind, method, o, reference);
+      }
+    }
+    return {};
+  }
+
+  void show(const Sequence& sequence, const MapKind& kind, Method method, const Result<Outcome>& o,
+            const std::optional<Isometry3d>& reference) {
+    const char* name = kMethodNames[static_cast<std::size_t>(method)];
+    const double kilobytes = double(file_bytes(b_.report.scratch())) / 1e3;
+    if (!o.ok()) {
+      b_.print(fmt::format("{:>19} {:>9.1f} {:>17} {}", kind.name, kilobytes, name, o.error().message));
+      return;
+    }
+    const Registration& r = o->registration;
+    examples::PoseDifference d{NAN, NAN};
+    if (reference) d = examples::difference(*reference, r.T_map_scan);
+    b_.print(
+        fmt::format("{:>19} {:>9.1f} {:>17} {:>8.3f} {:>8.3f} {:>7.0f} {:>8.2f} {:>8.0f}% {:>8.2f} {:>8.2f}",
+                    kind.name, kilobytes, name, d.mm, d.mrad, o->load_ms, o->seconds,
+                    100.0 * double(r.matched) / double(std::max<std::size_t>(1, r.points)),
+                    double(o->held) / 1e6, double(o->peak) / 1e6));
+    Json entry{{"sequence", sequence.name},  {"map", kind.name},
+               {"kilobytes", kilobytes},     {"method", name},
+               {"load_ms", o->load_ms},      {"seconds", o->seconds},
+               {"iterations", r.iterations}, {"converged", r.converged},
+               {"matched", r.matched},       {"points", r.points},
+               {"held_bytes", o->held},      {"peak_bytes", o->peak}};
+    if (reference) {
+      entry["difference_mm"] = d.mm;
+      entry["difference_mrad"] = d.mrad;
+    }
+    b_.report.json()["localisation"].push_back(std::move(entry));
+  }
+
+  LocalBench& b_;
+  std::vector<std::vector<Vec3>> scans_;
+  std::vector<std::string> paths_;
+  PointCloud map_;
+};
+
+}  // namespace
+
+Status bench_localisation(LocalBench& bench) {
+  bench.print("");
+  bench.print(
+      "Differences from the raw map's result by the same method (stored patches: by planes of points)");
+  Localisation run(bench);
+  for (const Sequence& sequence : kSequences) {
+    const std::vector<std::string>& only = bench.settings.files;
+    const auto named = [&](const std::string& part) {
+      return std::string(sequence.name).find(part) != std::string::npos;
+    };
+    if (!only.empty() && std::none_of(only.begin(), only.end(), named)) continue;
+    const Status s = run.run(sequence);
+    if (!s.ok()) bench.report.note(fmt::format("{}: {}", sequence.name, s.error().message));
+  }
+  return {};
+}
+
+}  // namespace mapcodec::bench
