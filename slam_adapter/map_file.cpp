@@ -5,7 +5,10 @@
 #include <fstream>
 #include <numeric>
 
+#include "mapcodec/codec/tile_segments.hpp"
+#include "maps/submap_pose.hpp"
 #include "parallel/encode_pipeline.hpp"
+#include "parallel/runner.hpp"
 #include "slam_adapter/compress.hpp"
 
 namespace mapcodec {
@@ -17,6 +20,25 @@ PointCloud inside(PointCloud cloud, const Region& region) {
     if (region.contains(cloud.xyz[i])) keep.push_back(static_cast<std::uint32_t>(i));
   }
   return keep.size() == cloud.size() ? std::move(cloud) : cloud.gather(keep);
+}
+
+/// From the frame of a submap to the map's, normals too.
+void move_to_map(PointCloud& cloud, const MapInfo& info, std::uint32_t submap) {
+  const RigidMotion pose = pose_of(info, submap);
+  if (pose.is_identity()) return;
+  for (Vec3& p : cloud.xyz) p = pose.apply(p);
+  Channel* normals = cloud.find("normal");
+  if (normals == nullptr || normals->info.components != 3 || normals->info.scalar != ScalarType::f32) return;
+  for (std::size_t i = 0; i < normals->size(); ++i) {
+    const Vec3 n =
+        pose.rotate({normals->get<float>(i, 0), normals->get<float>(i, 1), normals->get<float>(i, 2)});
+    for (std::size_t d = 0; d < 3; ++d) normals->set(i, static_cast<float>(n[d]), d);
+  }
+}
+
+/// Of a tile, in the map's frame.
+Box posed_bounds(const MapInfo& info, const TileRecord& tile) {
+  return pose_of(info, tile.submap).apply(tile.bounds);
 }
 
 /// A payload that passed its checksum and still does not decode means a damaged archive, whatever the decoder
@@ -31,7 +53,7 @@ std::vector<std::size_t> border_tiles(const MapFile& map, const Region& region,
   std::vector<std::size_t> border;
   for (const std::size_t i : map.tiles_in(region)) {
     const TileRecord& tile = map.archive().tiles()[i];
-    if (region.contains(tile.bounds)) {
+    if (region.contains(posed_bounds(map.archive().info(), tile))) {
       points_inside += tile.points;
     } else {
       border.push_back(i);
@@ -98,6 +120,12 @@ MapSummary MapFile::summary() const {
   s.ratio = s.raw_bytes == 0 ? 0 : double(s.bytes) / double(s.raw_bytes);
   s.achieved = info.achieved;
   s.bounds = info.bounds;
+  if (const auto levels = info.extras.find(kLevelsExtra); levels != info.extras.end()) {
+    // What a later version wrote otherwise is no reason not to show the rest.
+    if (auto read = read_level_errors(levels->second); read.ok()) s.levels = std::move(read).value();
+    // Of the sample it was measured on; of the map it is known.
+    if (!s.levels.levels.empty()) s.levels.levels.back().rms_m = info.achieved.rms_m;
+  }
   return s;
 }
 
@@ -112,18 +140,25 @@ std::vector<std::size_t> MapFile::tiles_in(const Region& region) const {
 
 Result<Bytes> MapFile::fetch(std::size_t index) const {
   const std::vector<SegmentRef>& segments = archive_->tiles()[index].segments;
-  if (segments.size() != 1) {
-    return make_error(ErrorCode::kUnsupported,
-                      "a tile of " + std::to_string(segments.size()) +
-                          " segments: this version reads maps that were not updated in place");
+  if (segments.size() == 1) return archive_->read(segments.front());
+  std::vector<Bytes> all;
+  for (const SegmentRef& segment : segments) {
+    MAPCODEC_ASSIGN(Bytes bytes, archive_->read(segment));
+    all.push_back(std::move(bytes));
   }
-  return archive_->read(segments.front());
+  return join_segments(all);
 }
 
-Result<PointCloud> MapFile::read_tile(std::size_t index, const DecodeLimits& limits) const {
+Result<PointCloud> MapFile::read_tile_in_submap(std::size_t index, const DecodeLimits& limits) const {
   MAPCODEC_ASSIGN(const Bytes bytes, fetch(index));
   auto cloud = decode_tile(bytes, schema_, limits);
   if (!cloud.ok()) return damaged(cloud.error());
+  return cloud;
+}
+
+Result<PointCloud> MapFile::read_tile(std::size_t index, const DecodeLimits& limits) const {
+  MAPCODEC_ASSIGN(PointCloud cloud, read_tile_in_submap(index, limits));
+  move_to_map(cloud, archive_->info(), archive_->tiles()[index].submap);
   return cloud;
 }
 
@@ -138,8 +173,15 @@ Status decode_each(const MapFile& map, const std::vector<std::size_t>& tiles, co
   pipeline.progress = settings.progress;
   pipeline.stop = settings.stop;
   const auto fetch_nth = [&](std::size_t i) { return fetch(tiles[i]); };
-  const auto sink_nth = [&](std::size_t i, PointCloud&& cloud) { return sink(tiles[i], std::move(cloud)); };
-  const Status s = decode_tiles(tiles.size(), fetch_nth, map.schema(), settings.limits, pipeline, sink_nth);
+  const auto sink_nth = [&](std::size_t i, PointCloud&& cloud) {
+    move_to_map(cloud, map.archive().info(), map.archive().tiles()[tiles[i]].submap);
+    return sink(tiles[i], std::move(cloud));
+  };
+  const auto decode = [&](ByteSpan bytes) {
+    return settings.level ? decode_tile_coarsely(bytes, map.schema(), *settings.level, settings.limits)
+                          : decode_tile(bytes, map.schema(), settings.limits);
+  };
+  const Status s = decode_tiles(tiles.size(), fetch_nth, decode, pipeline, sink_nth);
   return s.ok() ? s : Status(damaged(s.error()));
 }
 
@@ -162,18 +204,97 @@ Status MapFile::read(const Region& region, const ReadSettings& settings,
   return decode_each(
       *this, tiles_in(region), settings, [this](std::size_t i) { return fetch(i); },
       [&](std::size_t i, PointCloud&& cloud) {
-        const bool whole = region.contains(archive_->tiles()[i].bounds);
+        const bool whole = region.contains(posed_bounds(archive_->info(), archive_->tiles()[i]));
         return sink(whole ? std::move(cloud) : inside(std::move(cloud), region));
       });
 }
 
 Result<PointCloud> MapFile::read(const Region& region, const ReadSettings& settings) const {
-  PointCloud all = schema_.layout();
+  PointCloud all = layout(settings);
   MAPCODEC_TRY(read(region, settings, [&](PointCloud&& cloud) {
     all.append(cloud);
     return Status{};
   }));
   return all;
+}
+
+PointCloud MapFile::layout(const ReadSettings& settings) const {
+  PointCloud layout = schema_.layout();
+  if (settings.level) layout.channels.clear();
+  return layout;
+}
+
+bool MapFile::has_surfaces() const {
+  return std::any_of(archive_->tiles().begin(), archive_->tiles().end(), [](const TileRecord& t) {
+    const auto codec = static_cast<CodecId>(t.codec);
+    return codec == CodecId::surface || codec == CodecId::paper || codec == CodecId::joined;
+  });
+}
+
+bool MapFile::has_levels() const {
+  return std::any_of(archive_->tiles().begin(), archive_->tiles().end(), [](const TileRecord& t) {
+    const auto codec = static_cast<CodecId>(t.codec);
+    return codec == CodecId::surface || codec == CodecId::points || codec == CodecId::joined;
+  });
+}
+
+namespace {
+
+void move_to_map(TilePatches& tile, const RigidMotion& pose) {
+  if (pose.is_identity()) return;
+  for (SurfacePatch& p : tile.patches) {
+    p.center = pose.apply(p.center);
+    p.normal = pose.rotate(p.normal);
+    for (Vec3& corner : p.polygon) corner = pose.apply(corner);
+  }
+}
+
+void keep_inside(TilePatches& tile, const Region& region) {
+  std::erase_if(tile.patches, [&](const SurfacePatch& p) { return !region.contains(p.center); });
+}
+
+/// Takes the tiles some at a time, so that a map of any size has few of them in memory.
+struct PatchBatch {
+  std::vector<std::size_t> tiles;
+  std::vector<Bytes> bytes;
+  std::vector<Result<TilePatches>> read;
+
+  void decode(const MapSchema& schema, const ReadSettings& settings) {
+    read.assign(tiles.size(), TilePatches{});
+    const auto some = [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i)
+        read[i] = read_tile_patches(bytes[i], schema, settings.limits);
+    };
+    if (settings.arena == nullptr) return some(0, tiles.size());
+    TbbRunner runner(*settings.arena);
+    runner.run(tiles.size(), some);
+  }
+};
+
+}  // namespace
+
+Status MapFile::read_patches(const Region& region, const ReadSettings& settings,
+                             const std::function<Status(std::size_t, TilePatches&&)>& sink) const {
+  const std::vector<std::size_t> tiles = tiles_in(region);
+  const std::size_t at_once = settings.arena == nullptr ? 1 : 4 * std::size_t(settings.arena->threads());
+  for (std::size_t begin = 0; begin < tiles.size(); begin += at_once) {
+    if (settings.stop != nullptr && *settings.stop) return make_error(ErrorCode::kCancelled, "stopped");
+    PatchBatch batch;
+    for (std::size_t i = begin; i < std::min(begin + at_once, tiles.size()); ++i) {
+      batch.tiles.push_back(tiles[i]);
+      MAPCODEC_ASSIGN(Bytes bytes, fetch(tiles[i]));
+      batch.bytes.push_back(std::move(bytes));
+    }
+    batch.decode(schema_, settings);
+    for (std::size_t i = 0; i < batch.tiles.size(); ++i) {
+      if (!batch.read[i].ok()) return damaged(batch.read[i].error());
+      const TileRecord& tile = archive_->tiles()[batch.tiles[i]];
+      move_to_map(*batch.read[i], pose_of(archive_->info(), tile.submap));
+      if (!region.contains(posed_bounds(archive_->info(), tile))) keep_inside(*batch.read[i], region);
+      MAPCODEC_TRY(sink(batch.tiles[i], std::move(*batch.read[i])));
+    }
+  }
+  return {};
 }
 
 bool is_map_file(const std::string& path) {

@@ -11,10 +11,12 @@
 #include <vector>
 
 #include "mapcodec/cloud/map_schema.hpp"
-#include "mapcodec/codec/tile_codec.hpp"
+#include "mapcodec/codec/tile_levels.hpp"
+#include "mapcodec/codec/tile_patches.hpp"
 #include "maps/map_archive.hpp"
 #include "parallel/progress.hpp"
 #include "parallel/runner.hpp"
+#include "slam_adapter/level_errors.hpp"
 
 namespace mapcodec {
 
@@ -46,6 +48,7 @@ struct MapSummary {
   TileErrors achieved;
   Box bounds;
   std::map<std::string, CodecTotals> codecs;
+  LevelErrors levels;  ///< as measured when the map was compressed; none if it does not say
 };
 
 struct ReadSettings {
@@ -53,6 +56,8 @@ struct ReadSettings {
   DecodeLimits limits;
   ProgressCallback progress;
   const std::atomic<bool>* stop = nullptr;
+  /// Detail: cells of tile_size_m / 2^level a side (decode_tile_coarsely); points then have no channels.
+  std::optional<unsigned> level;
 };
 
 /// An opened map at one revision. Const methods may be called from many threads.
@@ -77,7 +82,20 @@ class MapFile {
                             const std::function<Status(PointCloud&&)>& sink) const;
   /// The points of `region`, together.
   [[nodiscard]] Result<PointCloud> read(const Region& region = {}, const ReadSettings& settings = {}) const;
-  /// Decodes one tile.
+  /// Hands the surfaces of the tiles that meet `region` to `sink`, tile by tile in Morton order, those whose
+  /// centres lie in it; for point-to-plane registration, planes and meshes. `settings.level` is ignored.
+  /// @param sink  gets the tile's index and its patches; of tiles whose codec keeps no surface, too.
+  [[nodiscard]] Status read_patches(const Region& region, const ReadSettings& settings,
+                                    const std::function<Status(std::size_t, TilePatches&&)>& sink) const;
+  /// Whether any tile has surfaces (codecs surface, paper), or levels of detail (surface, points).
+  [[nodiscard]] bool has_surfaces() const;
+  [[nodiscard]] bool has_levels() const;
+  /// No point; the channels that read() gives.
+  [[nodiscard]] PointCloud layout(const ReadSettings& settings) const;
+  /// Decodes one tile, its points in the frame of its submap.
+  [[nodiscard]] Result<PointCloud> read_tile_in_submap(std::size_t index,
+                                                       const DecodeLimits& limits = {}) const;
+  /// Decodes one tile, its points in the map's frame.
   [[nodiscard]] Result<PointCloud> read_tile(std::size_t index, const DecodeLimits& limits = {}) const;
 
  private:

@@ -38,6 +38,17 @@ int main(int argc, char** argv) {
   add_evaluate(app, action);
   add_render(app, action);
   add_bench(app, action);
+  add_log(app, action);
+  add_snapshot(app, action);
+  add_diff(app, action);
+  add_rollback(app, action);
+  add_compact(app, action);
+  add_repair(app, action);
+  add_update(app, action);
+  add_remove(app, action);
+  add_crop(app, action);
+  add_pose(app, action);
+  add_merge(app, action);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {

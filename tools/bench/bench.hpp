@@ -35,4 +35,12 @@ struct BenchSettings {
 /// The experiments of Morell et al. 2014 on our data (paper.json, paper.md, paper_*.png).
 [[nodiscard]] Status bench_paper(const BenchSettings& settings);
 
+/// Tiles fetched and decoded, a drive with a LocalMap, and localisation in compressed maps against the raw
+/// one (local.json, local.md). `files` chooses: "tiles", "drive", and sequences by parts of their names.
+[[nodiscard]] Status bench_local(const BenchSettings& settings);
+
+/// Maps built scan after scan beside maps made at once, and points taken in by a large map while it is read
+/// (update.json, update.md). `quick`: a map of 5 instead of 50 million points.
+[[nodiscard]] Status bench_update(const BenchSettings& settings);
+
 }  // namespace mapcodec

@@ -5,6 +5,7 @@
 
 #include <memory>
 
+#include "slam_adapter/planes_file.hpp"
 #include "tools/verbs/report.hpp"
 #include "tools/verbs/verbs.hpp"
 
@@ -12,8 +13,10 @@ namespace mapcodec::cli {
 namespace {
 
 struct Arguments {
-  std::string map, output, box, sphere, as = "points", progress = "auto";
+  std::string map, output, box, sphere, revision_name, as = "points", progress = "auto";
   std::optional<std::uint64_t> revision;
+  std::optional<unsigned> level;
+  SurfaceOptions surfaces;
   int threads = 0;
   bool json = false, force = false;
   WriteOptions write;
@@ -47,25 +50,48 @@ Json report_json(const DecompressReport& r) {
           {"peak_memory_bytes", peak_memory_bytes()}};
 }
 
-int run(const Arguments& a) {
-  if (a.as != "points") {
-    return fail(a.map, make_error(ErrorCode::kUnsupported, "--as " + a.as +
-                                                               " needs surface tiles, which this version "
-                                                               "does not have yet"));
+Json report_json(const SurfaceReport& r, bool planes) {
+  Json j{{"points", r.points},
+         {"patch_points", r.patch_points},
+         {"patches", r.patches},
+         {"tiles_read", r.tiles_read},
+         {"tiles_without_surfaces", r.tiles_without},
+         {"bytes_read", r.bytes_read},
+         {"tolerance_m", r.tolerance_m},
+         {"decode_seconds", r.seconds}};
+  if (planes) {
+    j["planes"] = r.planes;
+    j["plane_points"] = r.plane_points;
+    j["cylinders"] = r.cylinders;
+    j["cylinder_points"] = r.cylinder_points;
+  } else {
+    j["vertices"] = r.vertices;
+    j["faces"] = r.faces;
   }
-  const auto region = region_of(a);
-  if (!region.ok()) return fail("decompress", region.error());
-  if (!a.force && path_exists(a.output)) {
-    return fail(a.output, make_error(ErrorCode::kCannotWrite, "exists already (--force replaces it)"));
+  j["peak_memory_bytes"] = peak_memory_bytes();
+  return j;
+}
+
+std::string report_text(const SurfaceReport& r, bool planes) {
+  if (!planes) {
+    return fmt::format("{} triangles over {} vertices from {} patches", human_count(r.faces),
+                       human_count(r.vertices), human_count(r.patches));
   }
-  Arena arena(a.threads);
-  ReadSettings settings;
-  settings.arena = &arena;
-  settings.progress = progress_printer(a.progress);
-  settings.stop = stop_flag();
-  const auto r = decompress(a.map, a.output, *region, a.revision, settings, a.write);
-  settings.progress = {};
-  if (!r.ok()) return fail(r.error().code == ErrorCode::kCannotWrite ? a.output : a.map, r.error());
+  std::string s = fmt::format("{} planes", human_count(r.planes));
+  if (r.cylinders > 0) s += fmt::format(" and {} cylinders", human_count(r.cylinders));
+  return s + fmt::format(" with {:.1f} % of the points, from {} patches",
+                         100.0 * double(r.plane_points + r.cylinder_points) /
+                             double(std::max<std::uint64_t>(1, r.points)),
+                         human_count(r.patches));
+}
+
+int fail_decompress(const Arguments& a, const Error& error) {
+  return fail(error.code == ErrorCode::kCannotWrite ? a.output : a.map, error);
+}
+
+int write_points(const Arguments& a, const Region& region, const ReadSettings& settings) {
+  const auto r = decompress(a.map, a.output, region, a.revision, settings, a.write);
+  if (!r.ok()) return fail_decompress(a, r.error());
   if (a.json) {
     fmt::print("{}\n", report_json(*r).dump(2));
   } else {
@@ -76,19 +102,86 @@ int run(const Arguments& a) {
   return kDone;
 }
 
+int write_surfaces(const Arguments& a, const Region& region, const ReadSettings& settings) {
+  const bool planes = a.as == "planes";
+  SurfaceOptions options = a.surfaces;
+  options.ascii = a.write.ascii;
+  const auto r =
+      (planes ? decompress_planes : decompress_mesh)(a.map, a.output, region, a.revision, settings, options);
+  if (!r.ok()) return fail_decompress(a, r.error());
+  if (a.json) {
+    fmt::print("{}\n", report_json(*r, planes).dump(2));
+  } else {
+    fmt::print("{}: {}, {:.3f} s\n", a.output, report_text(*r, planes), r->seconds);
+  }
+  if (r->tiles_without > 0) {
+    fmt::print(stderr, "mapcodec: {}: {} of {} tiles keep points, not surfaces: they are left out\n", a.map,
+               r->tiles_without, r->tiles_read);
+  }
+  return kDone;
+}
+
+/// What cannot be asked together, in one sentence; empty if all is well.
+std::string contradiction(const Arguments& a) {
+  if (a.as != "points" && a.level) return "--level is for --as points";
+  if (a.as != "planes" && a.surfaces.cylinders) return "--cylinders is for --as planes";
+  if (a.as != "points" && a.write.compressed) return "--binary-compressed is for --as points";
+  if (a.as == "points" && a.surfaces.tolerance_m > 0) return "--tolerance is for --as planes or mesh";
+  return {};
+}
+
+int run(Arguments& a) {
+  if (const std::string wrong = contradiction(a); !wrong.empty()) {
+    fmt::print(stderr, "mapcodec: decompress: {}\n", wrong);
+    return kUsage;
+  }
+  const auto region = region_of(a);
+  if (!region.ok()) return fail("decompress", region.error());
+  if (!a.force && path_exists(a.output)) {
+    return fail(a.output, make_error(ErrorCode::kCannotWrite, "exists already (--force replaces it)"));
+  }
+  if (!a.revision_name.empty()) {
+    const auto archive = MapArchive::open(a.map);
+    const auto number = archive.ok() ? archive->resolve(a.revision_name) : archive.error();
+    if (!number.ok()) return fail(a.map, number.error());
+    a.revision = *number;
+  }
+  Arena arena(a.threads);
+  ReadSettings settings;
+  settings.arena = &arena;
+  settings.progress = progress_printer(a.progress);
+  settings.stop = stop_flag();
+  settings.level = a.level;
+  return (a.as == "points" ? write_points : write_surfaces)(a, *region, settings);
+}
+
 }  // namespace
 
 void add_decompress(CLI::App& app, Action& action) {
   auto a = std::make_shared<Arguments>();
-  CLI::App* verb = app.add_subcommand("decompress", "An archive in; points out");
+  CLI::App* verb = app.add_subcommand("decompress", "An archive in; points, planes or a mesh out");
   verb->add_option("MAP", a->map, "The archive")->required();
-  verb->add_option("-o,--output", a->output, "File to write: .pcd .ply .las .xyz .txt .pts .bin .vtk")
+  verb->add_option("-o,--output", a->output,
+                   "File to write: .pcd .ply .las .xyz .txt .pts .bin .vtk; planes: JSON; mesh: .ply")
       ->required();
   auto* box = verb->add_option("--box", a->box, "Only points in x0,y0,z0,x1,y1,z1 [m]");
   verb->add_option("--sphere", a->sphere, "Only points in x,y,z,r [m]")->excludes(box);
-  verb->add_option("--revision", a->revision, "As the map was at revision N");
-  verb->add_option("--as", a->as, "points, planes or mesh")
+  verb->add_option("--revision", a->revision_name,
+                   "As the map was at revision N, or at the snapshot of that name");
+  verb->add_option("--level", a->level,
+                   "Points in less detail: cells of the tile size halved N times (info lists the levels); "
+                   "without channels")
+      ->check(CLI::Range(0u, kMostTileLevel));
+  verb->add_option("--as", a->as, "points, planes (JSON) or mesh (PLY with faces)")
       ->check(CLI::IsMember({"points", "planes", "mesh"}));
+  verb->add_option(
+          "--tolerance", a->surfaces.tolerance_m,
+          "How far a plane's pieces may lie off it, and how wide the slits of a mesh that are closed "
+          "[m] (default: the map's step or RMS)")
+      ->check(CLI::Range(1e-9, 1e6));
+  verb->add_option("--least-points", a->surfaces.least_points, "Smallest plane or cylinder [points]");
+  verb->add_flag("--cylinders", a->surfaces.cylinders,
+                 "--as planes: cylinders, too, where they describe the points better (RANSAC: slow)");
   verb->add_flag("--ascii", a->write.ascii, "Text instead of binary (PCD, PLY, VTK)");
   verb->add_flag("--binary-compressed", a->write.compressed, "PCD: the binary_compressed form");
   verb->add_option("--threads", a->threads, "0: all cores")->check(CLI::Range(0, 1024));

@@ -57,6 +57,24 @@ Json codecs_json(const MapSummary& s) {
   return r;
 }
 
+/// Only where the map says it.
+Json levels_json(const MapSchema& schema, const LevelErrors& e) {
+  Json list = Json::array();
+  for (std::size_t l = 0; l < e.levels.size(); ++l) {
+    list.push_back({{"level", l},
+                    {"cell_m", std::ldexp(schema.tile_size_m, -static_cast<int>(l))},
+                    {"rms_m", e.levels[l].rms_m},
+                    {"byte_share", e.levels[l].byte_share}});
+  }
+  return list;
+}
+
+std::string level_text(const MapSchema& schema, const LevelErrors& e, std::size_t l) {
+  return fmt::format("{}: cells of {}, RMS {}, {:.0f} % of the bytes", l,
+                     human_length(std::ldexp(schema.tile_size_m, -static_cast<int>(l))),
+                     human_length(e.levels[l].rms_m), 100 * e.levels[l].byte_share);
+}
+
 std::string promise_text(const MapSchema& s) {
   switch (s.promise) {
     case PromiseKind::lossless:
@@ -216,6 +234,7 @@ Json info_json(const MapFile& map) {
   j["revision"] = map.archive().revision();
   j["submaps"] = std::max<std::size_t>(1, map.archive().info().submaps.size());
   j["input_points"] = map.archive().info().input_points;
+  j["levels"] = levels_json(schema, s.levels);
   j["dropped_points"] = map.archive().info().dropped_points;
   return j;
 }
@@ -264,6 +283,15 @@ void print_info(const MapFile& map) {
     row("codec", fmt::format("{}: {} tiles, {} points, {}", name, t.tiles, human_count(t.points),
                              human_bytes(t.bytes)));
   }
+  // Levels that take all bytes save nothing.
+  const auto& levels = s.levels.levels;
+  const bool worth = levels.size() > 1 && levels.front().byte_share < 1;
+  for (std::size_t l = 0; worth && l < levels.size(); ++l) {
+    if (levels[l].byte_share < 1 || l + 1 == levels.size())
+      row(l == 0 ? "level" : "", level_text(schema, s.levels, l));
+  }
+  if (worth && s.levels.tiles < s.tiles)
+    row("", fmt::format("(but the last, levels are measured on {} of the tiles)", s.levels.tiles));
 }
 
 Json evaluation_json(const Evaluation& e, std::uint64_t bytes, std::uint64_t raw_bytes) {

@@ -17,5 +17,16 @@ void add_verify(CLI::App& app, Action& action);
 void add_evaluate(CLI::App& app, Action& action);
 void add_render(CLI::App& app, Action& action);
 void add_bench(CLI::App& app, Action& action);
+void add_log(CLI::App& app, Action& action);
+void add_snapshot(CLI::App& app, Action& action);
+void add_diff(CLI::App& app, Action& action);
+void add_rollback(CLI::App& app, Action& action);
+void add_compact(CLI::App& app, Action& action);
+void add_repair(CLI::App& app, Action& action);
+void add_update(CLI::App& app, Action& action);
+void add_remove(CLI::App& app, Action& action);
+void add_crop(CLI::App& app, Action& action);
+void add_pose(CLI::App& app, Action& action);
+void add_merge(CLI::App& app, Action& action);
 
 }  // namespace mapcodec::cli

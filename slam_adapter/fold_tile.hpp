@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What updates left pending in a tile becomes part of it for good.
+#pragma once
+
+#include <optional>
+
+#include "mapcodec/codec/tile_codec.hpp"
+#include "mapcodec/codec/tile_segments.hpp"
+
+namespace mapcodec {
+
+/// How pending segments are coded: more exactly than promised, so that folding, which codes their points a
+/// second and last time, has room for its own error. No point is ever coded a third time with loss: errors do
+/// not build up however often a map is updated and compacted.
+struct PendingCoding {
+  TileSettings tiles;
+  MapSchema schema;  ///< with the colour bound of pending segments
+  double rms_m = 0;  ///< root mean square error that the step gives; 0 where the promise is not an rms
+};
+/// Errors: Unsupported (a map by the paper's method).
+[[nodiscard]] Result<PendingCoding> pending_coding(const MapSchema& schema, Effort effort);
+
+/// A tile's content after folding.
+struct Fold {
+  std::uint8_t codec = 0;  ///< first byte of `bytes`
+  std::uint64_t points = 0;
+  Box bounds;  ///< [m, submap frame]
+  TileErrors errors;
+  Bytes bytes;  ///< one payload, joined where the tile had a base that stays as it is
+};
+
+/// Folds the pending segments of a tile, and erasures where that loses nothing. Where positions lie on the
+/// map's lattice (max_error) or are exact (lossless), all becomes one base; else (rms, or colours within a
+/// bound) segments that were folded before stay bit for bit, and all pending ones together become one more.
+/// @param segments  base, then deltas. @param errors, bounds  of the tile.
+/// @return nothing if there is nothing to fold; `points` 0 if nothing is left of the tile.
+/// Pure: same input, same bytes. Errors: those of decoding and encoding; PromiseBroken if no coding keeps it.
+[[nodiscard]] Result<std::optional<Fold>> fold_tile(const std::vector<Bytes>& segments,
+                                                    const MapSchema& schema, const TileErrors& errors,
+                                                    const Box& bounds);
+
+}  // namespace mapcodec

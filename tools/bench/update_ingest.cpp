@@ -1,0 +1,161 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <spdlog/fmt/fmt.h>
+
+#include <atomic>
+#include <filesystem>
+#include <random>
+#include <thread>
+
+#include "mapcodec/cloud/cloud_source.hpp"
+#include "slam_adapter/create_map.hpp"
+#include "slam_adapter/map_file.hpp"
+#include "tools/bench/clouds.hpp"
+#include "tools/bench/update.hpp"
+#include "tools/peers/grid.hpp"
+
+namespace mapcodec::bench {
+namespace {
+
+using Watch = peers::StopWatch;
+
+constexpr double kPromise = 0.02;  // [m] max_error: what a map for navigation has
+constexpr double kPeriod = 0.1;    // [s] of a turn of the sensor
+constexpr double kStride = 2;      // [m] that the sensor moves between scans
+
+/// A real scan of a spinning lidar, cut to what one turn of a 130,000-point sensor gives by standing where it
+/// stood again with a small turn: never the same points twice.
+PointCloud scan_at(const PointCloud& real, double x, unsigned seed) {
+  std::mt19937 random(seed);
+  const double turn = 0.02 * (double(random()) / 4294967296.0 - 0.5),
+               lift = 0.02 * double(random()) / 4294967296.0;
+  PointCloud c = real;
+  for (Vec3& p : c.xyz) {
+    const double s = std::sin(turn), k = std::cos(turn);
+    p = {k * p[0] - s * p[1] + x, s * p[0] + k * p[1], p[2] + lift};
+  }
+  c.coordinates = {CoordinateFormat::Kind::f64, {1, 1, 1}, {0, 0, 0}};
+  return c;
+}
+
+/// The scan with the most points of a spinning lidar, twice with an offset: about 130,000 points.
+Result<PointCloud> real_scan(const BenchSettings& settings) {
+  BenchSettings lidar = settings;
+  lidar.files = {"small_gicp/data/source"};
+  MAPCODEC_ASSIGN(const std::vector<std::string> paths, find_clouds(lidar));
+  if (paths.empty()) return make_error(ErrorCode::kEmpty, settings.data + ": no small_gicp/data/source");
+  MAPCODEC_ASSIGN(BenchCloud c, load_cloud(paths.front()));
+  c.cloud.channels.clear();
+  std::erase_if(c.cloud.xyz, [](const Vec3& p) { return p == Vec3{0, 0, 0}; });
+  const PointCloud half = c.cloud;
+  c.cloud.append(scan_at(half, 0.05, 1));
+  return std::move(c.cloud);
+}
+
+/// Reads random tiles until told to stop. @return points per second of its own time.
+double read_on(const std::string& path, const std::atomic<bool>& stop, double seconds) {
+  const auto map = MapFile::open(path);
+  if (!map.ok()) return 0;
+  std::mt19937 random(7);
+  const Watch watch(Watch::Kind::wall);
+  std::uint64_t points = 0;
+  while (!stop && watch.seconds() < seconds) {
+    const auto cloud = map->read_tile(random() % map->archive().tiles().size());
+    points += cloud.ok() ? cloud->size() : 0;
+  }
+  return double(points) / watch.seconds();
+}
+
+Status fill(MapUpdater& map, const PointCloud& scan, std::uint64_t points) {
+  double x = 0;
+  for (std::uint64_t n = 0; n < points; n += scan.size(), x += kStride) {
+    MAPCODEC_TRY(map.insert(scan_at(scan, x, unsigned(n))));
+  }
+  const auto r = map.commit(0);
+  return r.ok() ? Status{} : Status(r.error());
+}
+
+struct Ingest {
+  double points_per_second = 0;
+  std::vector<double> commits;  ///< [s] from the scan to its revision on the disk
+  std::uint64_t added = 0, bytes = 0;
+};
+
+/// @param period_s  0: one scan after the other; else a scan each so many seconds, as a sensor gives them.
+Result<Ingest> ingest(MapUpdater& map, const PointCloud& scan, int scans, double period_s) {
+  Ingest r;
+  std::uint64_t points = 0;
+  std::vector<PointCloud> all;
+  for (int i = 0; i < scans; ++i) all.push_back(scan_at(scan, 0.5 * kStride * i, unsigned(100000 + i)));
+  const Watch watch(Watch::Kind::wall);
+  for (PointCloud& c : all) {
+    const double early = period_s * double(r.commits.size()) - watch.seconds();
+    if (early > 0) std::this_thread::sleep_for(std::chrono::duration<double>(early));
+    points += c.size();
+    const Watch one(Watch::Kind::wall);
+    MAPCODEC_TRY(map.insert(std::move(c)));
+    MAPCODEC_ASSIGN(const UpdateReport u, map.commit(0));
+    r.commits.push_back(one.seconds());
+    r.added += u.points_added;
+    r.bytes += u.bytes;
+  }
+  r.points_per_second = double(points) / watch.seconds();
+  return r;
+}
+
+void report_ingest(Report& report, const std::string& name, const Ingest& r, double reader, double solo) {
+  report.row({name, digits(r.points_per_second / 1e6), digits(1e3 * quantile(r.commits, 0.5)),
+              digits(1e3 * quantile(r.commits, 0.99)), digits(reader / 1e6),
+              digits(solo > 0 ? reader / solo : 0)});
+  report.json()["ingest"].push_back(Json{{"name", name},
+                                         {"points_per_second", r.points_per_second},
+                                         {"commit_p50_s", quantile(r.commits, 0.5)},
+                                         {"commit_p99_s", quantile(r.commits, 0.99)},
+                                         {"points_added", r.added},
+                                         {"segment_bytes", r.bytes},
+                                         {"reader_points_per_second", reader},
+                                         {"reader_solo_points_per_second", solo}});
+}
+
+}  // namespace
+
+Status measure_ingest(const BenchSettings& settings, Report& report) {
+  const std::uint64_t size = settings.quick ? 5'000'000 : 50'000'000;
+  MAPCODEC_ASSIGN(const PointCloud scan, real_scan(settings));
+  Arena arena(settings.threads);
+  CompressOptions o;
+  o.promise = PromiseKind::max_error;
+  o.promise_m = kPromise;
+  o.overwrite = true;
+  std::vector<std::string> warnings;
+  CloudSource first(scan);
+  UpdateSettings update;
+  update.density_cap = false;
+  settings.say(fmt::format("a map of {} points", size));
+  {
+    MAPCODEC_ASSIGN(MapUpdater map, create_map(report.scratch(), first, o, arena, update, warnings));
+    MAPCODEC_TRY(fill(map, scan, size));
+  }
+  const std::atomic<bool> never = false;
+  settings.say("reading alone");
+  const double solo = read_on(report.scratch(), never, 5);
+  report.line(
+      fmt::format("\n## Scans of {} points into a map of {} million\n", scan.size(), size / 1'000'000));
+  report.table({"", "M points/s", "commit ms p50", "p99", "reader M points/s", "of alone"});
+  const int scans = settings.quick ? 30 : 150;
+  update.density_cap = true;
+  for (const bool with_reader : {false, true}) {
+    settings.say(with_reader ? "writing, with a reader" : "writing alone");
+    MAPCODEC_ASSIGN(MapUpdater map, MapUpdater::open(report.scratch(), arena, update));
+    std::atomic<bool> stop = false;
+    double reader = 0;
+    std::thread reading([&] { reader = with_reader ? read_on(report.scratch(), stop, 1e9) : 0; });
+    const auto r = ingest(map, scan, scans, with_reader ? kPeriod : 0);
+    stop = true;
+    reading.join();
+    if (!r.ok()) return r.error();
+    report_ingest(report, with_reader ? "at 10 Hz, with a reader" : "as fast as it goes", *r, reader, solo);
+  }
+  return {};
+}
+
+}  // namespace mapcodec::bench
