@@ -11,6 +11,8 @@ namespace {
 constexpr unsigned kFinest = 4;  // log2 of half a step
 constexpr std::uint64_t kAxisBits = 21;
 constexpr double kFar = 1e30;
+// With fewer points to a block its cells are finer than anything that can be known.
+constexpr std::size_t kLeastInBlock = 1;
 
 std::uint64_t key_of(std::int64_t x, std::int64_t y, std::int64_t z) {
   return static_cast<std::uint64_t>(x) | (static_cast<std::uint64_t>(y) << kAxisBits) |
@@ -25,93 +27,153 @@ unsigned bit_of(std::int64_t x, std::int64_t y, std::int64_t z) {
   return static_cast<unsigned>((x & 3) | ((y & 3) << 2) | ((z & 3) << 4));
 }
 
+/// The cells of a block that lie on its lower or upper face, per axis, as bits.
+constexpr std::array<std::uint64_t, 3> kLowFace{0x1111111111111111u, 0x000f000f000f000fu, 0xffffu};
+constexpr std::array<std::uint64_t, 3> kHighFace{0x8888888888888888u, 0xf000f000f000f000u,
+                                                 0xffff000000000000u};
+
+/// What the cells of one block touch along one axis, in the block at `to` = -1, 0 or 1 along it.
+std::uint64_t touched(std::uint64_t cells, unsigned axis, int to) {
+  const unsigned step = 2 * axis, one = 1u << step, across = 3u << step;
+  if (to < 0) return (cells & kLowFace[axis]) << across;
+  if (to > 0) return (cells & kHighFace[axis]) >> across;
+  return cells | ((cells & ~kHighFace[axis]) << one) | ((cells & ~kLowFace[axis]) >> one);
+}
+
 }  // namespace
 
-std::uint64_t Coverage::Level::cells_of(std::uint64_t key) const {
+Coverage::Block& Coverage::Level::slot(std::uint64_t key) {
   const std::size_t mask = table.size() - 1;
-  for (std::size_t i = hash_of(key) & mask;; i = (i + 1) & mask) {
-    if (table[i].key == key) return table[i].cells;
-    if (table[i].key == kFree) return 0;
+  std::size_t i = hash_of(key) & mask;
+  while (table[i].key != kFree && table[i].key != key) i = (i + 1) & mask;
+  return table[i];
+}
+
+const Coverage::Block& Coverage::Level::block_at(std::uint64_t key) {
+  if (table[last].key == key) return table[last];
+  const std::size_t mask = table.size() - 1;
+  std::size_t i = hash_of(key) & mask;
+  while (table[i].key != kFree && table[i].key != key) i = (i + 1) & mask;
+  last = i;
+  return table[i];
+}
+
+void Coverage::Level::spread(const Block& from) {
+  constexpr std::int64_t kMask = (std::int64_t{1} << kAxisBits) - 1;
+  const auto key = static_cast<std::int64_t>(from.key);
+  const std::int64_t x = key & kMask, y = (key >> kAxisBits) & kMask, z = key >> (2 * kAxisBits);
+  for (int dz = -1; dz <= 1; ++dz) {
+    const std::uint64_t in_z = touched(from.cells, 2, dz);
+    if (in_z == 0 || z + dz < 0) continue;
+    for (int dy = -1; dy <= 1; ++dy) {
+      const std::uint64_t in_y = touched(in_z, 1, dy);
+      if (in_y == 0 || y + dy < 0) continue;
+      for (int dx = -1; dx <= 1; ++dx) {
+        const std::uint64_t in_x = touched(in_y, 0, dx);
+        if (in_x == 0 || x + dx < 0) continue;
+        const std::uint64_t to = key_of(x + dx, y + dy, z + dz);
+        Block& b = slot(to);
+        b.key = to;
+        b.near |= in_x;
+      }
+    }
   }
 }
 
-Coverage::Coverage(std::span<const Units> points, unsigned depth) {
-  for (unsigned side = std::min(kFinest, depth); side <= depth; ++side) {
-    add_level(points, side);
-    if (side > kFinest + 2 && levels_.back().table.size() <= 16) break;
+bool Coverage::Level::is_sparse(std::span<const Units> points, unsigned side) {
+  std::size_t blocks = 1;
+  for (std::size_t i = 1; i < points.size(); ++i) {
+    const Units &p = points[i - 1], &q = points[i];
+    blocks += (((p[0] ^ q[0]) | (p[1] ^ q[1]) | (p[2] ^ q[2])) >> (side + 2)) != 0;
   }
+  return 3 * blocks * kLeastInBlock > 2 * points.size();
 }
 
-void Coverage::add_level(std::span<const Units> points, unsigned side) {
+void Coverage::Level::build(std::span<const Units> points) {
   // Morton order: what is in one block stands together.
   std::vector<Block> blocks;
   for (const Units& p : points) {
     const std::int64_t x = p[0] >> side, y = p[1] >> side, z = p[2] >> side;
     const std::uint64_t key = key_of(x >> 2, y >> 2, z >> 2);
-    if (blocks.empty() || blocks.back().key != key) blocks.push_back({key, 0});
+    if (blocks.empty() || blocks.back().key != key) blocks.push_back({key, 0, 0});
     blocks.back().cells |= std::uint64_t{1} << bit_of(x, y, z);
   }
-  Level level{side, std::vector<Block>(std::bit_ceil(2 * blocks.size() + 2))};
-  const std::size_t mask = level.table.size() - 1;
+  std::size_t touching = 0;
   for (const Block& b : blocks) {
-    std::size_t i = hash_of(b.key) & mask;
-    while (level.table[i].key != kFree) i = (i + 1) & mask;
-    level.table[i] = b;
+    int faces = 1;
+    for (unsigned d = 0; d < 3; ++d)
+      faces *= 1 + ((b.cells & kLowFace[d]) != 0) + ((b.cells & kHighFace[d]) != 0);
+    touching += static_cast<std::size_t>(faces);
   }
-  levels_.push_back(std::move(level));
+  table.assign(std::bit_ceil(touching + touching / 4 + 2), Block{});
+  for (const Block& b : blocks) {
+    Block& mine = slot(b.key);
+    mine.key = b.key;
+    mine.cells = b.cells;
+    spread(b);
+  }
 }
 
-double Coverage::squared_distance(const std::array<double, 3>& place, double covered) {
+Coverage::Coverage(std::span<const Units> points, unsigned depth) : points_(points) {
+  // The last level is one block, in which any place is near a point or far from all.
+  unsigned side = std::min(kFinest, depth);
+  while (side + 1 < depth && Level::is_sparse(points, side)) ++side;
+  for (; side <= std::max(depth, kFinest); ++side) levels_.push_back({side, {}, 0});
+}
+
+Coverage::Level& Coverage::level(std::size_t l) {
+  if (levels_[l].table.empty()) levels_[l].build(points_);
+  return levels_[l];
+}
+
+std::size_t Coverage::first_level(double covered) const {
   // Cells much smaller than the distance that does not matter need no look.
   const int fine = std::ilogb(covered) / 2 - static_cast<int>(levels_.front().side) - 1;
-  const auto first = static_cast<std::size_t>(std::clamp(fine, 0, static_cast<int>(levels_.size()) - 1));
-  const unsigned side = levels_[first].side;
-  const std::int64_t x = static_cast<std::int64_t>(place[0]) >> side,
-                     y = static_cast<std::int64_t>(place[1]) >> side,
-                     z = static_cast<std::int64_t>(place[2]) >> side;
-  if (x >= 0 && y >= 0 && z >= 0 &&
-      ((levels_[first].cells_of(key_of(x >> 2, y >> 2, z >> 2)) >> bit_of(x, y, z)) & 1) != 0) {
-    return 0;
-  }
-  // Half a cell is near enough: what is asked is whether there is anything at all.
-  const unsigned shift = side > 0 ? side - 1 : 0;
-  std::array<std::int64_t, 3> p;
-  for (std::size_t d = 0; d < 3; ++d) p[d] = static_cast<std::int64_t>(std::max(0.0, place[d])) >> shift;
-  const std::uint64_t key = key_of(p[0], p[1], p[2]) ^ (static_cast<std::uint64_t>(first) << 58);
-  Known& known = known_[hash_of(key) & (kKnown - 1)];
-  if (known.key != key) {
-    for (std::size_t d = 0; d < 3; ++d) p[d] = (p[d] << shift) + (std::int64_t{1} << shift) / 2;
-    known = {key, static_cast<float>(search(p, first))};
-  }
-  return known.squared < covered ? 0 : known.squared;
+  return static_cast<std::size_t>(std::clamp(fine, 0, static_cast<int>(levels_.size()) - 1));
 }
 
-double Coverage::search(const std::array<std::int64_t, 3>& p, std::size_t first) const {
+bool Coverage::is_near(Level& level, const Cell& p) {
+  const std::int64_t x = p[0] >> level.side, y = p[1] >> level.side, z = p[2] >> level.side;
+  return ((level.block_at(key_of(x >> 2, y >> 2, z >> 2)).near >> bit_of(x, y, z)) & 1) != 0;
+}
+
+/// Squared distance to the middle of the nearest of the eight cells around the corner of the cell grid that
+/// is nearest to the place.
+double Coverage::nearest_of_eight(Level& level, const Cell& p) {
+  const std::int64_t half = (std::int64_t{1} << level.side) / 2;
+  Cell low;
+  for (std::size_t d = 0; d < 3; ++d) low[d] = (p[d] - half) >> level.side;
+  double best = kFar;
+  for (int i = 0; i < 8; ++i) {
+    const std::int64_t x = low[0] + (i & 1), y = low[1] + ((i >> 1) & 1), z = low[2] + (i >> 2);
+    if (x < 0 || y < 0 || z < 0) continue;
+    const Block& block = level.block_at(key_of(x >> 2, y >> 2, z >> 2));
+    if (((block.cells >> bit_of(x, y, z)) & 1) == 0) continue;
+    const auto dx = static_cast<double>((x << level.side) + half - p[0]);
+    const auto dy = static_cast<double>((y << level.side) + half - p[1]);
+    const auto dz = static_cast<double>((z << level.side) + half - p[2]);
+    best = std::min(best, dx * dx + dy * dy + dz * dz);
+  }
+  return best;
+}
+
+double Coverage::squared_distance(const std::array<double, 3>& place, double covered, std::size_t first) {
+  Cell p;
+  for (std::size_t d = 0; d < 3; ++d) p[d] = static_cast<std::int64_t>(std::max(0.0, place[d]));
+  if (is_near(level(first), p)) return 0;
   for (std::size_t l = first; l < levels_.size(); ++l) {
-    // The eight cells around the corner of the cell grid that is nearest to the place.
-    const Level& level = levels_[l];
-    const std::int64_t half = (std::int64_t{1} << level.side) / 2;
-    std::array<std::int64_t, 3> low;
-    for (std::size_t d = 0; d < 3; ++d) low[d] = (p[d] - half) >> level.side;
-    double best = kFar;
-    std::uint64_t last_key = kFree, cells = 0;
-    for (int i = 0; i < 8; ++i) {
-      const std::int64_t x = low[0] + (i & 1), y = low[1] + ((i >> 1) & 1), z = low[2] + (i >> 2);
-      if (x < 0 || y < 0 || z < 0) continue;
-      const std::uint64_t key = key_of(x >> 2, y >> 2, z >> 2);
-      if (key != last_key) {
-        cells = level.cells_of(key);
-        last_key = key;
-      }
-      if (((cells >> bit_of(x, y, z)) & 1) == 0) continue;
-      const double dx = static_cast<double>((x << level.side) + half - p[0]);
-      const double dy = static_cast<double>((y << level.side) + half - p[1]);
-      const double dz = static_cast<double>((z << level.side) + half - p[2]);
-      best = std::min(best, dx * dx + dy * dy + dz * dz);
-    }
-    if (best < kFar) return best;
+    if (!is_near(level(l), p)) continue;
+    const double squared = nearest_of_eight(levels_[l], p);
+    if (squared < kFar) return squared < covered ? 0 : squared;
   }
   return kFar;
+}
+
+double Coverage::sum_of_squared(std::span<const std::array<double, 3>> places, double covered) {
+  const std::size_t first = first_level(covered);
+  double sum = 0;
+  for (const auto& p : places) sum += squared_distance(p, covered, first);
+  return sum;
 }
 
 }  // namespace mapcodec::surface

@@ -11,37 +11,51 @@
 
 namespace mapcodec::surface {
 
-/// A pyramid of occupied cells; the finest has half a surface step a side.
+/// A pyramid of occupied cells; the finest has half a surface step a side. Levels are built when first asked
+/// for, so a Coverage belongs to one thread.
 class Coverage {
  public:
-  /// @param points  Morton-sorted. @param depth  log2 of the root cell's side.
+  /// @param points  Morton-sorted; must outlive this. @param depth  log2 of the root cell's side.
   Coverage(std::span<const Units> points, unsigned depth);
   /// Squared distance [units^2] from a place [units] to the nearest point, within about a cell's side; 0 if
   /// it is less than `covered` [units^2].
-  [[nodiscard]] double squared_distance(const std::array<double, 3>& place, double covered);
+  [[nodiscard]] double squared_distance(const std::array<double, 3>& place, double covered) {
+    return squared_distance(place, covered, first_level(covered));
+  }
+  /// Sum over several places.
+  [[nodiscard]] double sum_of_squared(std::span<const std::array<double, 3>> places, double covered);
 
  private:
   static constexpr std::uint64_t kFree = ~std::uint64_t{0};
+  using Cell = std::array<std::int64_t, 3>;
   /// Four cells a side, one bit each.
   struct Block {
     std::uint64_t key = kFree;
-    std::uint64_t cells = 0;
+    std::uint64_t cells = 0;  ///< that hold points
+    std::uint64_t near = 0;   ///< that do, or touch one that does
   };
   struct Level {
-    unsigned side;  ///< of a cell, log2 [units]
+    unsigned side = 0;  ///< of a cell, log2 [units]
     std::vector<Block> table;
-    [[nodiscard]] std::uint64_t cells_of(std::uint64_t key) const;
-  };
-  void add_level(std::span<const Units> points, unsigned side);
-  [[nodiscard]] double search(const std::array<std::int64_t, 3>& place, std::size_t first) const;
+    std::size_t last = 0;  ///< where the last answer was found: the next is often the same
+    void build(std::span<const Units> points);
+    /// Points to a block of cells, on average.
+    [[nodiscard]] static bool is_sparse(std::span<const Units> points, unsigned side);
+    [[nodiscard]] const Block& block_at(std::uint64_t key);
 
-  /// Answers found before, since the candidates of nested cells ask for the same places again.
-  struct Known {
-    std::uint64_t key = kFree;
-    float squared = 0;
+   private:
+    void spread(const Block& from);
+    Block& slot(std::uint64_t key);
   };
-  static constexpr std::size_t kKnown = std::size_t{1} << 14;
-  std::vector<Known> known_ = std::vector<Known>(kKnown);
+
+  [[nodiscard]] std::size_t first_level(double covered) const;
+  [[nodiscard]] Level& level(std::size_t l);
+  [[nodiscard]] double squared_distance(const std::array<double, 3>& place, double covered,
+                                        std::size_t first);
+  [[nodiscard]] static bool is_near(Level& level, const Cell& place);
+  [[nodiscard]] static double nearest_of_eight(Level& level, const Cell& place);
+
+  std::span<const Units> points_;
   std::vector<Level> levels_;
 };
 

@@ -31,7 +31,87 @@ std::array<double, 16> reach_of(std::span<const Units> points, const TreeCell& c
   return reach;
 }
 
+/// Squared distance to the nearest of kCount places; each of them remembers the least it took part in.
+template <std::size_t kCount, std::size_t kRoom>
+float nearest_of(const std::array<std::array<float, kRoom>, 3>& places, float x, float y, float z,
+                 std::array<float, kRoom>& near) {
+  std::array<float, kCount> squared;
+  for (std::size_t i = 0; i < kCount; ++i) {
+    const float dx = places[0][i] - x, dy = places[1][i] - y, dz = places[2][i] - z;
+    squared[i] = dx * dx + dy * dy + dz * dz;
+    near[i] = squared[i] < near[i] ? squared[i] : near[i];
+  }
+  for (std::size_t half = kCount / 2; half >= 4; half /= 2) {
+    for (std::size_t i = 0; i < half; ++i)
+      squared[i] = squared[i + half] < squared[i] ? squared[i + half] : squared[i];
+  }
+  return std::min(std::min(squared[0], squared[1]), std::min(squared[2], squared[3]));
+}
+
+using Place = std::array<double, 3>;
+
+Place operator-(const Place& a, const Place& b) {
+  return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
+}
+double area_of(const Place& a, const Place& b) {
+  const double x = a[1] * b[2] - a[2] * b[1], y = a[2] * b[0] - a[0] * b[2], z = a[0] * b[1] - a[1] * b[0];
+  return std::sqrt(x * x + y * y + z * z);
+}
+
+/// Places of a lattice of `count` in the unit square, in the order of their first coordinate.
+constexpr double kGolden = 0.6180339887498949;
+
+void scatter_rectangle(const Place& corner, const Place& u, const Place& v, std::uint32_t count,
+                       std::vector<Place>& out) {
+  double y = 0.5;
+  for (std::uint32_t i = 0; i < count; ++i) {
+    const double x = (i + 0.5) / count;
+    out.push_back(
+        {corner[0] + x * u[0] + y * v[0], corner[1] + x * u[1] + y * v[1], corner[2] + x * u[2] + y * v[2]});
+    y += kGolden;
+    y -= y >= 1 ? 1 : 0;
+  }
+}
+
+/// The polygon as a fan of triangles, each a folded square.
+void scatter_fan(std::span<const Place> corners, std::uint32_t count, std::vector<Place>& out) {
+  std::array<double, 12> upto{};
+  double all = 0;
+  for (std::size_t t = 0; t + 2 < corners.size(); ++t) {
+    all += area_of(corners[t + 1] - corners[0], corners[t + 2] - corners[0]);
+    upto[t] = all;
+  }
+  double y = 0.5, from = 0;
+  std::size_t t = 0;
+  for (std::uint32_t i = 0; i < count; ++i) {
+    const double at = (i + 0.5) / count * all;
+    while (at > upto[t] && t + 3 < corners.size()) from = upto[t++];
+    double x = (at - from) / std::max(upto[t] - from, 1e-12), z = y;
+    if (x + z > 1) {
+      x = 1 - x;
+      z = 1 - z;
+    }
+    const Place u = corners[t + 1] - corners[0], v = corners[t + 2] - corners[0];
+    out.push_back({corners[0][0] + x * u[0] + z * v[0], corners[0][1] + x * u[1] + z * v[1],
+                   corners[0][2] + x * u[2] + z * v[2]});
+    y += kGolden;
+    y -= y >= 1 ? 1 : 0;
+  }
+}
+
 }  // namespace
+
+void LeafErrors::scatter(const TreeCell& cell, const Plane& plane, const Polygon& polygon,
+                         std::uint32_t count, std::vector<Place>& out) {
+  std::array<Place, 12> corners;
+  const auto size = static_cast<std::size_t>(polygon.size);
+  for (std::size_t i = 0; i < size; ++i) corners[i] = place(cell, plane, polygon.at[i]);
+  if (polygon.rectangle) {
+    scatter_rectangle(corners[0], corners[1] - corners[0], corners[3] - corners[0], count, out);
+  } else {
+    scatter_fan({corners.data(), size}, count, out);
+  }
+}
 
 LeafErrors::Place LeafErrors::place(const TreeCell& cell, const Plane& plane, const Vertex& x) {
   Place r;
@@ -81,32 +161,37 @@ double LeafErrors::of_single(const TreeCell& cell, const Plane* plane) {
   return squared(at, points_[cell.begin]);
 }
 
-LeafError LeafErrors::of_few(const TreeCell& cell, const Plane& plane, const Polygon& polygon,
-                             std::uint8_t noise) {
-  const std::uint32_t n = cell.count();
+void LeafErrors::decode_few(const TreeCell& cell, const Plane& plane, const Polygon& polygon) {
   vertices_.clear();
-  spread(polygon, plane, cell.shape, n, vertices_);
-  std::array<double, kFew> near;
-  std::array<Place, kFew> places;
-  for (std::uint32_t i = 0; i < n; ++i) {
-    near[i] = kNever;
-    places[i] = place(cell, plane, vertices_[i]);
-    places[i][plane.axis] += double(noise_offset(noise, i)) / (1 << kHeightBits);
+  spread(polygon, plane, cell.shape, cell.count(), vertices_);
+  // Far places fill the rest, so that loops over all of them have a fixed length.
+  for (auto& row : few_.at) row.fill(kFarPlace);
+  for (std::uint32_t i = 0; i < cell.count(); ++i) {
+    const Place p = place(cell, plane, vertices_[i]);
+    for (std::size_t d = 0; d < 3; ++d) few_.at[d][i] = static_cast<float>(p[d] - 0.5 - cell.at[d]);
   }
-  LeafError e{0, 0, 0, 0};
+}
+
+LeafError LeafErrors::of_few(const TreeCell& cell, const Plane& plane, std::uint8_t noise) const {
+  FewPlaces few = few_;
+  if (noise != 0) {
+    for (std::uint32_t i = 0; i < cell.count(); ++i)
+      few.at[plane.axis][i] += static_cast<float>(noise_offset(noise, i)) / (1 << kHeightBits);
+  }
+  std::array<float, kFew> near;
+  near.fill(kFarPlace * kFarPlace);
+  double forth = 0;
+  const std::size_t n = cell.count() <= kFew / 2 ? kFew / 2 : kFew;
   for (std::size_t j = cell.begin; j < cell.end; ++j) {
-    double least = kNever;
-    for (std::uint32_t i = 0; i < n; ++i) {
-      const double s = squared(places[i], points_[j]);
-      least = std::min(least, s);
-      near[i] = std::min(near[i], s);
-    }
-    e.forth += least;
+    const float x = static_cast<float>(points_[j][0] - static_cast<std::int32_t>(cell.at[0])),
+                y = static_cast<float>(points_[j][1] - static_cast<std::int32_t>(cell.at[1])),
+                z = static_cast<float>(points_[j][2] - static_cast<std::int32_t>(cell.at[2]));
+    forth += static_cast<double>(n == kFew ? nearest_of<kFew>(few.at, x, y, z, near)
+                                           : nearest_of<kFew / 2>(few.at, x, y, z, near));
   }
-  for (std::uint32_t i = 0; i < n; ++i) e.back += near[i];
-  e.beside_forth = e.forth;
-  e.beside_back = e.back;
-  return e;
+  double back = 0;
+  for (std::uint32_t i = 0; i < cell.count(); ++i) back += static_cast<double>(near[i]);
+  return {forth, back, forth, back};
 }
 
 LeafError LeafErrors::of_many(const TreeCell& cell, const Plane& plane, const Polygon& polygon, double beside,
@@ -127,11 +212,9 @@ double LeafErrors::missed(const TreeCell& cell, const Plane& plane, const Polygo
                           std::uint32_t probes) {
   const std::uint32_t n = cell.count();
   const double covered = area_of(cell.shape, plane, polygon) / n + kStep2 * kCoveredSteps2;
-  vertices_.clear();
-  spread(polygon, plane, cell.shape, probes, vertices_);
-  double sum = 0;
-  for (const Vertex& x : vertices_) sum += coverage_.squared_distance(place(cell, plane, x), covered);
-  return sum * n / double(vertices_.size());
+  places_.clear();
+  scatter(cell, plane, polygon, probes, places_);
+  return coverage_.sum_of_squared(places_, covered) * n / double(places_.size());
 }
 
 double LeafErrors::roughness(const TreeCell& cell, const Plane& plane, double mean_squared) const {

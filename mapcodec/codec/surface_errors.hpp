@@ -33,9 +33,10 @@ class LeafErrors {
   [[nodiscard]] LeafError at_center(const TreeCell& cell, const Moments& m) const;
   /// One point, on the plane if there is one [units^2].
   [[nodiscard]] double of_single(const TreeCell& cell, const Plane* plane);
-  /// At most kFew points, spread over the polygon.
-  [[nodiscard]] LeafError of_few(const TreeCell& cell, const Plane& plane, const Polygon& polygon,
-                                 std::uint8_t noise);
+  /// Spreads the points of a cell of at most kFew over its polygon, for of_few().
+  void decode_few(const TreeCell& cell, const Plane& plane, const Polygon& polygon);
+  /// The cell last given to decode_few(), with its plane.
+  [[nodiscard]] LeafError of_few(const TreeCell& cell, const Plane& plane, std::uint8_t noise) const;
   /// More points. @param beside  squared distances to the plane. @param missed  see missed().
   /// @param roughness  see roughness(); only where noise > 0.
   [[nodiscard]] LeafError of_many(const TreeCell& cell, const Plane& plane, const Polygon& polygon,
@@ -54,12 +55,21 @@ class LeafErrors {
  private:
   using Place = std::array<double, 3>;
   static Place place(const TreeCell& cell, const Plane& plane, const Vertex& x);
+  /// Places spread evenly over the polygon, in no particular order.
+  static void scatter(const TreeCell& cell, const Plane& plane, const Polygon& polygon, std::uint32_t count,
+                      std::vector<Place>& out);
   static double squared(const Place& a, const Units& b);
 
   std::span<const Units> points_;
   MomentTable moments_;
   Coverage coverage_;
+  static constexpr float kFarPlace = 1e12F;
+  struct FewPlaces {
+    std::array<std::array<float, kFew>, 3> at;  ///< by axis, from the cell's lowest corner
+  };
+  FewPlaces few_{};
   std::vector<Vertex> vertices_;  // scratch
+  std::vector<Place> places_;     // scratch
 };
 
 /// Squared distances of a leaf's points to its plane, as its decoded points' thickness changes them in both

@@ -32,6 +32,17 @@ struct Planes {
   double own_bits = 0, none_bits = 0;
 };
 
+/// Kinds of leaves that lost many times in a row are tried less often.
+class Luck {
+ public:
+  bool is_worth_a_try() { return ++losses_ < kPatience || losses_ % kRare == 0; }
+  void won() { losses_ = 0; }
+
+ private:
+  static constexpr std::uint32_t kPatience = 64, kRare = 8;
+  std::uint32_t losses_ = 0;
+};
+
 class Optimizer {
  public:
   Optimizer(std::span<const Units> points, unsigned depth, Models& models, const OptimizerSettings& settings)
@@ -41,7 +52,7 @@ class Optimizer {
         lambda_(settings.lambda_steps * kStep2),
         prices_(models),
         errors_(points, depth) {
-    if (models.voxel_bits > 0) voxels_ = VoxelErrors(points, models.voxel_bits, errors_, forward_, lambda_);
+    if (models.voxel_bits > 0) voxels_ = VoxelErrors(points, models.voxel_bits, forward_, lambda_);
   }
 
   std::vector<Choice> run() {
@@ -195,20 +206,22 @@ class Optimizer {
     const Polygon polygon = polygon_of(plane, cell.shape);
     if (polygon.size < 3) return;
     if (cell.count() <= LeafErrors::kFew) {
-      consider_few(cell, c, plane, polygon, r, best);
+      consider_few(cell, c, plane, polygon, beside, r, best);
     } else {
       consider_many(cell, c, plane, polygon, beside, r, limit, best);
     }
   }
 
   void consider_few(const TreeCell& cell, const CellContext& c, const Plane& plane, const Polygon& polygon,
-                    Candidate r, Candidate& best) {
+                    double beside, Candidate r, Candidate& best) {
     const bool with_extras = cell.count() >= kWedgePoints;
     const double bare = r.bits + (with_extras ? prices_.wedge(c, nullptr) : 0);
-    for (std::uint8_t noise = 0; noise <= (with_extras ? 2 : 0); ++noise) {
+    const bool may_be_thick = with_extras && beside >= kLeastThickness2 * cell.count();
+    errors_.decode_few(cell, plane, polygon);
+    for (std::uint8_t noise = 0; noise <= (may_be_thick ? 2 : 0); ++noise) {
       r.noise = noise;
       r.bits = bare + (with_extras ? prices_.noise(c, noise, false) : 0);
-      set_error(r, errors_.of_few(cell, plane, polygon, noise));
+      set_error(r, errors_.of_few(cell, plane, noise));
       take_if_better(r, best);
     }
   }
@@ -297,24 +310,31 @@ class Optimizer {
     if (!prices_.can_be_block(cell)) return;
     const PlaneState state = p.inherited != nullptr ? PlaneState::inherited : PlaneState::none;
     const double flags = p.none_bits + prices_.leaf(cell, c, state, true);
+    const double to_beat = std::min(limit, cost_of(best));
+    constexpr double kLeastBits = 0.7;  // a voxel
+    const double least_bits = kLeastBits * voxels_.count_in(cell);
+    if (lambda_ * (flags + least_bits) >= to_beat) return;
+    Luck& luck = blocks_[2 * cell.count() < 3 * voxels_.count_in(cell)];
+    if (!luck.is_worth_a_try()) return;
+    const auto errors = voxels_.errors_in(cell, errors_);
     Candidate r;
     for (std::uint8_t noise = 0; noise <= kMostNoise; ++noise) {
       Candidate t;
       t.block = true;
       t.noise = noise;
-      t.error = t.excess = voxels_.error_in(cell, noise);
+      t.error = t.excess = errors[noise];
       t.bits = flags + prices_.noise(c, noise, true);
       take_if_better(t, r);
     }
-    constexpr double kLeastBits = 0.7;  // a voxel
-    if (cost_of(r) + kLeastBits * lambda_ * voxels_.count_in(cell) >= std::min(limit, cost_of(best))) return;
-    r.bits += walk_block(cell, p.inherited, -1);
+    if (cost_of(r) + least_bits * lambda_ >= to_beat) return;
+    r.bits += walk_block(cell, p.inherited, -1, (to_beat - cost_of(r)) / lambda_);
+    if (cost_of(r) < to_beat) luck.won();
     take_if_better(r, best);
   }
 
-  /// Price of the halves of a block's cells down to its voxels; writes them down as choices from `me` on if
-  /// that is >= 0.
-  double walk_block(const TreeCell& cell, const Plane* plane, std::int64_t me) {
+  /// Price of the halves of a block's cells down to its voxels, or part of it where that is more than `most`;
+  /// writes them down as choices from `me` on if that is >= 0.
+  double walk_block(const TreeCell& cell, const Plane* plane, std::int64_t me, double most = kNever) {
     if (cell.shape[0] + cell.shape[1] + cell.shape[2] == 3 * prices_.voxel_bits()) return 0;
     const unsigned axis = cell.axis();
     const std::size_t split = cell.first_above(points_);
@@ -322,6 +342,7 @@ class Optimizer {
     double bits = prices_.block_division(cell, plane, halves);
     for (unsigned h = 0; h < 2; ++h) {
       if (halves == static_cast<int>(2 - h)) continue;
+      if (bits > most) return bits;
       const TreeCell child = cell.half(h == 1, split);
       Plane passed;
       if (plane != nullptr) passed = in_child(*plane, axis, h == 1, cell.shape[axis]);
@@ -332,7 +353,7 @@ class Optimizer {
         choices_.emplace_back();
         choices_.back().count = child.count();
       }
-      bits += walk_block(child, plane != nullptr ? &passed : nullptr, next);
+      bits += walk_block(child, plane != nullptr ? &passed : nullptr, next, most - bits);
     }
     return bits;
   }
@@ -432,6 +453,7 @@ class Optimizer {
   Prices prices_;
   LeafErrors errors_;
   VoxelErrors voxels_;
+  std::array<Luck, 2> blocks_;  ///< of several points to a voxel, and of about one
   std::vector<Choice> choices_;
   std::vector<std::uint8_t> halves_;  // scratch
 };

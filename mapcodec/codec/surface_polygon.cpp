@@ -2,6 +2,7 @@
 #include "mapcodec/codec/surface_polygon.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdlib>
 
 namespace mapcodec::surface {
@@ -90,6 +91,20 @@ std::int64_t width_at(const Polygon& p, bool is_u, std::int64_t x) {
   return most > least ? most - least : 0;
 }
 
+/// The least x in [0, length] up to which a trapezium of widths w0 to w1 has `goal` or more of twice the
+/// area.
+std::int64_t place_in_slab(std::int64_t length, std::int64_t w0, std::int64_t w1, std::int64_t goal) {
+  // Twice the area up to x, times the length: x (2 w0 length + (w1 - w0) x), which grows with x. The root in
+  // floating point is only a guess: the integers decide.
+  const auto enough = [&](std::int64_t x) { return x * (2 * w0 * length + (w1 - w0) * x) >= goal * length; };
+  const double b = double(w0) * double(length), c = double(goal) * double(length);
+  const double root = b + std::sqrt(std::max(0.0, b * b + double(w1 - w0) * c));
+  std::int64_t x = root > 0 ? static_cast<std::int64_t>(std::min(c / root, double(length))) : 0;
+  while (x < length && !enough(x)) ++x;
+  while (x > 0 && enough(x - 1)) --x;
+  return x;
+}
+
 /// The coordinate below which `lower` of `count` parts of the area lie.
 std::int32_t cut_position(const Polygon& p, bool is_u, std::uint32_t lower, std::uint32_t count) {
   std::array<std::int32_t, 12> stops;
@@ -111,17 +126,7 @@ std::int32_t cut_position(const Polygon& p, bool is_u, std::uint32_t lower, std:
       w0 = w1;
       continue;
     }
-    // Twice the area up to x, times the length: x (2 w0 length + (w1 - w0) x).
-    std::int64_t lo = 0, hi = length;
-    while (lo < hi) {
-      const std::int64_t middle = (lo + hi) / 2;
-      if (middle * (2 * w0 * length + (w1 - w0) * middle) < goal * length) {
-        lo = middle + 1;
-      } else {
-        hi = middle;
-      }
-    }
-    return static_cast<std::int32_t>(stops[i - 1] + lo);
+    return static_cast<std::int32_t>(stops[i - 1] + place_in_slab(length, w0, w1, goal));
   }
   return stops[p.size - 1];
 }
@@ -197,6 +202,11 @@ Polygon polygon_of(const Plane& plane, const CellShape& shape) {
   p.rectangle = true;
   const std::int64_t half = half_side(shape[plane.axis]);
   const std::int64_t reach = std::abs(std::int64_t{plane.a}) + std::abs(std::int64_t{plane.b});
+  if (std::abs(std::int64_t{plane.h}) > half + reach) {
+    p.size = 0;
+    p.rectangle = false;
+    return p;
+  }
   if (plane.h + reach > half) clip(p, plane.h - half, plane.a, plane.b);
   if (-plane.h + reach > half) clip(p, -plane.h - half, -std::int64_t{plane.a}, -std::int64_t{plane.b});
   return p;
