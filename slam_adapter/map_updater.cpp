@@ -96,8 +96,6 @@ Status add_segments(StoredPoints& stored, const std::vector<Bytes>& segments, co
   return {};
 }
 
-constexpr const char* kCapName = "density_cap";
-
 }  // namespace
 
 struct MapUpdater::State {
@@ -534,7 +532,7 @@ Result<UpdateReport> MapUpdater::commit(std::int64_t timestamp_s) {
   info.input_points = s.input_points;
   info.input_bytes = s.input_bytes;
   info.extras.erase(kLevelsExtra);  // measured on what the map was
-  if (s.settings.density_cap && report.points_in > 0) info.extras[kCapName] = Bytes{1};
+  if (s.settings.density_cap && report.points_in > 0) info.extras[kDensityCapExtra] = Bytes{1};
   MAPCODEC_TRY(s.writer.set_info(std::move(info)));
   MAPCODEC_ASSIGN(report.revision, s.writer.commit(timestamp_s));
   report.committed = true;

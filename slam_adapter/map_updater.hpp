@@ -16,6 +16,9 @@
 
 namespace mapcodec {
 
+/// Key in MapInfo::extras of maps that were updated with the density cap; one byte, the rule's version: 1.
+inline constexpr const char* kDensityCapExtra = "density_cap";
+
 struct UpdateSettings {
   /// What lies on stored surfaces within the promise, at the density already reached, adds nothing.
   bool density_cap = true;

@@ -13,6 +13,7 @@
 #include "mapcodec/codec/lossless_encoder.hpp"
 #include "mapcodec/codec/points_encoder.hpp"
 #include "mapcodec/codec/surface_encoder.hpp"
+#include "mapcodec/codec/tile_segments.hpp"
 #include "mapcodec/geometry/morton.hpp"
 #include "maps/map_writer.hpp"
 #include "tests/fuzz/seeds.hpp"
@@ -48,11 +49,39 @@ void points_seeds(SeedFolder& folder) {
   }
 }
 
+/// Byte 0: level; then a payload of several segments (segments_fuzz.cpp).
+void segment_seeds(SeedFolder& folder) {
+  MapSchema schema;
+  schema.tile_size_m = 4;
+  schema.step_m = 0.01;
+  Erasure erasure;
+  erasure.box = Box{{0, 0, 0}, {1, 1, 1}};
+  erasure.motion = std::array<double, 12>{0, -1, 0, 1, 0, 0, 0, 0, 1, 0.5, 0, 0};
+  std::vector<Bytes> segments;
+  for (const CodecId codec : {CodecId::points, CodecId::surface, CodecId::points}) {
+    PointCloud cloud;
+    cloud.xyz = corner(40);
+    TileSettings settings;
+    settings.codec = codec;
+    auto tile = encode_tile(cloud, schema, settings);
+    if (!tile) continue;
+    segments.push_back(std::move(tile->bytes));
+    segments.push_back(write_erasure(erasure));
+    erasure.sphere = Erasure::Sphere{{0, 0, 0}, 0.5};
+    erasure.inverse = !erasure.inverse;
+    Bytes seed{3};
+    const Bytes joined = join_segments(segments);
+    seed.insert(seed.end(), joined.begin(), joined.end());
+    folder.write("segments", seed);
+  }
+}
+
 /// Bytes 0 and 1: number of points; byte 2: levels, 0 for all (surface_fuzz.cpp).
 void surface_seeds(SeedFolder& folder) {
   for (const std::size_t count : {1u, 20u, 1000u, 5000u}) {
     for (const double step : {0.002, 0.02, 0.2}) {
-      auto encoded = encode_surface(corner(count), Quantizer{{0, 0, 0}, step, CoordinateFormat::Kind::f32}, {});
+      auto encoded =
+          encode_surface(corner(count), Quantizer{{0, 0, 0}, step, CoordinateFormat::Kind::f32}, {});
       if (!encoded.ok()) continue;
       if (count > 20) (void)set_voxels(*encoded, surface::least_voxel_shift(encoded->header.depth));
       Bytes seed{std::uint8_t(count), std::uint8_t(count >> 8), std::uint8_t(count == 5000 ? 20 : 0)};
@@ -127,6 +156,7 @@ int main(int argc, char** argv) {
   mapcodec::fuzz::SeedFolder folder(argv[1]);
   mapcodec::fuzz::points_seeds(folder);
   mapcodec::fuzz::surface_seeds(folder);
+  mapcodec::fuzz::segment_seeds(folder);
   mapcodec::fuzz::channel_seeds(folder);
   mapcodec::fuzz::lossless_seeds(folder);
   mapcodec::fuzz::archive_seed(folder, 1, 1);

@@ -3,7 +3,7 @@
 """Adds golden archives: small maps whose decoded points must never change.
 
 Usage: make_golden.py MAPCODEC_PROGRAM [--replace]
-Makes the clouds of CLOUDS by rule, compresses each and writes tests/golden/NAME.mapc and its entry in hashes.json, as
+Makes the clouds of CLOUDS by rule, compresses each, goes through the changes of HISTORIES, and writes tests/golden/NAME.mapc and its entry in hashes.json, as
 tests/support/read_tile.py decodes it. Archives that are there already are left alone: what is tested is that later
 versions decode them, not that later versions write the same bytes. Until format 1.0 --replace makes all of them anew
 after a deliberate change of the format; from 1.0 on files are only added, never rewritten. Standard library only.
@@ -183,7 +183,38 @@ CLOUDS = {
 }
 
 
+def moved_room():
+    rows = [(*p, packed(c), i) for p, c, i in room(random.Random(12), 500, offset=(1.5, 0, 0))]
+    return pcd(COLORED, rows)
+
+
+# name: (command line that makes the map, then those that change it; MAP, A and B stand for files)
+HISTORIES = {
+    "living_pending": ("update MAP A --create --rms 0.05 --tile-size 2", "update MAP B", "remove MAP --box 0,0,0,1,1,1"),
+    "living_folded": ("compress A -o MAP --rms 0.05 --codec surface --color-error 12", "update MAP B", "compact MAP",
+                      "remove MAP --where intensity:0:5", "update MAP A --all-points", "remove MAP --sphere 1,1,0,0.5"),
+    "living_hashes": ("compress A -o MAP --max-error 0.01 --tile-size 2", "update MAP B", "snapshot MAP both",
+                      "compact MAP --hashes on", "crop MAP --box 0,0,0,3,3,3"),
+    "living_lossless": ("update MAP A --create --lossless", "update MAP B", "compact MAP"),
+}
+
+
+def make_history(program, name, folder):
+    files = {"A": folder / "a.pcd", "B": folder / "b.pcd", "MAP": folder / "map.mapc"}
+    files["A"].write_bytes(colored_room())
+    files["B"].write_bytes(moved_room())
+    files["MAP"].unlink(missing_ok=True)
+    for line in HISTORIES[name]:
+        threads = [] if line.startswith("snapshot") else ["--threads", "1"]
+        subprocess.run([program, *(files.get(word, word) for word in line.split()), *threads], check=True,
+                       stdout=subprocess.DEVNULL, env={"SOURCE_DATE_EPOCH": "0"})
+    (HERE / f"{name}.mapc").write_bytes(files["MAP"].read_bytes())
+    return read_tile.digest(files["MAP"].read_bytes())
+
+
 def make(program, name, folder):
+    if name in HISTORIES:
+        return make_history(program, name, folder)
     input_name, maker, flags = CLOUDS[name]
     source, archive = folder / input_name, HERE / f"{name}.mapc"
     source.write_bytes(maker())
@@ -200,7 +231,7 @@ def main():
     listing = HERE / "hashes.json"
     hashes = json.loads(listing.read_text()) if listing.exists() else {}
     with tempfile.TemporaryDirectory() as folder:
-        for name in CLOUDS:
+        for name in [*CLOUDS, *HISTORIES]:
             if options.replace or name not in hashes:
                 hashes[name] = make(options.program, name, pathlib.Path(folder))
                 listing.write_text(json.dumps(hashes, indent=1, sort_keys=True) + "\n")

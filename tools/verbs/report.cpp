@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "tools/verbs/report.hpp"
 
+#include "slam_adapter/map_updater.hpp"
+
 #include <spdlog/fmt/fmt.h>
 #include <sys/resource.h>
 #include <unistd.h>
@@ -234,6 +236,7 @@ Json info_json(const MapFile& map) {
   j["revision"] = map.archive().revision();
   j["submaps"] = std::max<std::size_t>(1, map.archive().info().submaps.size());
   j["input_points"] = map.archive().info().input_points;
+  j["density_cap"] = map.archive().info().extras.count(kDensityCapExtra) != 0;
   j["levels"] = levels_json(schema, s.levels);
   j["dropped_points"] = map.archive().info().dropped_points;
   return j;
@@ -270,6 +273,10 @@ void print_info(const MapFile& map) {
                               human_length(s.achieved.max_axis_error_m)));
   row("", fmt::format("colour error {:.2f}, density error {:.3f}", s.achieved.color_error,
                       s.achieved.density_error));
+  if (map.archive().info().extras.count(kDensityCapExtra) != 0)
+    row("updates", "leave out what the map has already, within its promise");
+  if (const std::size_t n = map.archive().info().submaps.size(); n > 1)
+    row("submaps", fmt::format("{}, each with its pose", human_count(n)));
   for (std::size_t d = 0; d < 3 && !s.bounds.empty(); ++d) {
     row(d == 0 ? "bounds" : "",
         fmt::format("{} {:.3f} .. {:.3f} m", "xyz"[d], s.bounds.min[d], s.bounds.max[d]));
