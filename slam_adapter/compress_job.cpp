@@ -30,6 +30,11 @@ constexpr double kLeastRms = 0.95, kRmsAim = 0.992;
 constexpr double kNearRms = 0.98;
 constexpr int kTriesForNear = 3;
 
+// Of the map's colour, in shares of its bound: where it shall lie, what is near enough, and the range of
+// losses.
+constexpr double kColorAim = 0.985, kNearColor = 0.96, kLeastLoss = 0.05, kMostLoss = 4, kAboveLeast = 1.2;
+constexpr int kColorTries = 4;
+
 using Clock = std::chrono::steady_clock;
 
 double lap(Clock::time_point& from) {
@@ -67,6 +72,8 @@ Result<CompressReport> CompressJob::run() {
   report_.tiling_seconds = lap(at);
   MAPCODEC_ASSIGN(choice_, choose_plan(options_, *tiles_, schema_, arena_, report_.warnings));
   report_.search_seconds = lap(at);
+  if (const auto color = bounded_color(); color && !has_target() && choice_.plan.has_surfaces())
+    color_loss_ = 0.6 * schema_.channels[*color].bound;
   MAPCODEC_TRY(encode_until_kept());
   report_.seconds = lap(begin);
   report_.threads = arena_.threads();
@@ -145,6 +152,7 @@ Status CompressJob::encode_until_kept() {
   }
   say_if_finer_for_color();
   say_if_color_misses();
+  record_reachable_color();
   auto at = Clock::now();
   MAPCODEC_TRY(commit());
   report_.commit_seconds = lap(at);
@@ -154,7 +162,15 @@ Status CompressJob::encode_until_kept() {
 /// What was measured on the sample may be off for the whole map: then the step is changed.
 bool CompressJob::is_kept_or_adjust() {
   if (has_target()) return meets_target_or_adjust();
+  const auto color = bounded_color();
+  const bool colored = color_loss_ > 0 && color;
+  const ColorState state = colored ? adjust_map_color(schema_.channels[*color].bound) : ColorState::met;
+  if (state == ColorState::finer_positions) return false;
   if (schema_.promise == PromiseKind::rms && !meets_rms_or_adjust()) return false;
+  if (colored && choice_.plan.has_surfaces()) {
+    color_tries_ += state == ColorState::missed;
+    return state == ColorState::met;
+  }
   return meets_color_or_adjust();
 }
 
@@ -195,6 +211,29 @@ bool CompressJob::meets_rms_or_adjust() {
   return false;
 }
 
+/// All surface tiles have one loss on top of what their positions cost: so bits go where they help most.
+/// Positions are made finer only where no loss is small enough and the bound was asked for.
+CompressJob::ColorState CompressJob::adjust_map_color(double asked_bound) {
+  // error^2 = floor^2 + loss * error, for the map as for a tile.
+  const double error = coded_.errors().color_error, floor2 = std::max(0.0, error * (error - color_loss_));
+  // Coming near what is least takes many bits for little: nobody asked for that.
+  const double sensible = options_.color_error_asked ? 0 : kAboveLeast * std::sqrt(floor2);
+  const double bound = std::max(asked_bound, sensible);
+  const double least = kLeastLoss * bound, most = kMostLoss * bound;
+  if (error > bound && color_loss_ <= least) {
+    if (!options_.color_error_asked) return ColorState::met;
+    choice_.plan.step_m *= 0.8;
+    ++color_tries_;
+    return ColorState::finer_positions;
+  }
+  if (error <= bound && (error >= kNearColor * bound || color_loss_ >= most || color_tries_ >= kColorTries))
+    return ColorState::met;
+  const double aim = kColorAim * bound;
+  color_loss_ = std::clamp((aim * aim - floor2) / aim, least, most);
+  if (error > bound && color_tries_ > kColorTries) color_loss_ = least;
+  return ColorState::missed;
+}
+
 bool CompressJob::meets_color_or_adjust() {
   const auto color = bounded_color();
   CodingPlan& plan = choice_.plan;
@@ -233,8 +272,18 @@ void CompressJob::say_if_color_misses() {
   const auto color = bounded_color();
   const double error = coded_.errors().color_error;
   if (!color || !(error > schema_.channels[*color].bound)) return;
-  report_.warnings.push_back("the colour error is " + std::to_string(error) +
-                             ", above the bound: points of different colours share a position");
+  report_.warnings.push_back("the colour error is " + std::to_string(error).substr(0, 5) +
+                             ", above the bound: " +
+                             (choice_.plan.has_surfaces() ? "a smaller --rms gives better colours"
+                                                          : "points of different colours share a position"));
+}
+
+/// A bound that nobody asked for is not promised if it was not kept.
+void CompressJob::record_reachable_color() {
+  const auto color = bounded_color();
+  const double error = coded_.errors().color_error;
+  if (options_.color_error_asked || !color || !(error > schema_.channels[*color].bound)) return;
+  schema_.channels[*color].bound = std::ceil(error * 100 + 1) / 100;
 }
 
 /// What was achieved is what is promised.
@@ -254,6 +303,7 @@ Status CompressJob::encode_once() {
   report_.tile_seconds.clear();
   levels_->clear();
   schema_.step_m = choice_.plan.step_m;
+  choice_.plan.tiles.color_loss = color_loss_;
   MapInfo info;
   info.schema = write_schema(schema_);
   info.origin = plan_.origin();

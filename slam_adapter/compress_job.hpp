@@ -44,8 +44,11 @@ class CompressJob {
   bool meets_target_or_adjust();
   bool meets_rms_or_adjust();
   bool meets_color_or_adjust();
+  enum class ColorState { met, missed, finer_positions };
+  ColorState adjust_map_color(double asked_bound);
   void say_if_finer_for_color();
   void say_if_color_misses();
+  void record_reachable_color();
 
   PointSource& source_;
   const std::string path_;
@@ -65,6 +68,7 @@ class CompressJob {
   double best_step_ = 0, best_bits_ = INFINITY;  // of the codings that kept the promise, the smallest
   std::optional<LogSecant> secant_;              // over the codings of the whole map
   int target_tries_ = 0, rms_tries_ = 0, color_tries_ = 0;
+  double color_loss_ = 0;    // of surface tiles, the same for all; 0: each meets the bound
   double color_target_ = 1;  // share of the colour bound that tiles aim at
   CompressReport report_;
 };

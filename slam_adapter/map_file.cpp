@@ -123,7 +123,8 @@ MapSummary MapFile::summary() const {
   if (const auto levels = info.extras.find(kLevelsExtra); levels != info.extras.end()) {
     // What a later version wrote otherwise is no reason not to show the rest.
     if (auto read = read_level_errors(levels->second); read.ok()) s.levels = std::move(read).value();
-    // Of the sample it was measured on; of the map it is known.
+    // They were measured on a sample; of the whole map the last one is known, and no other is better.
+    for (LevelErrors::Level& l : s.levels.levels) l.rms_m = std::max(l.rms_m, info.achieved.rms_m);
     if (!s.levels.levels.empty()) s.levels.levels.back().rms_m = info.achieved.rms_m;
   }
   return s;

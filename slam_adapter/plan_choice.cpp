@@ -43,7 +43,10 @@ class Chooser {
       : options_(options), sample_(sample), schema_(schema), arena_(arena), warnings_(warnings) {
     choice_.plan.choice = CodecChoice::points;
     choice_.plan.step_m = schema.step_m;
-    choice_.plan.tiles = {codec_of(options.promise), options.effort, options.keep_counts, 0, options.paper};
+    choice_.plan.tiles.codec = codec_of(options.promise);
+    choice_.plan.tiles.effort = options.effort;
+    choice_.plan.tiles.keep_counts = options.keep_counts;
+    choice_.plan.tiles.paper = options.paper;
     choice_.spacing_m = sample.spacing_m;
     choice_.side_m = sample.side_m;
   }

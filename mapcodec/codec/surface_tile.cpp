@@ -58,11 +58,13 @@ Channel on_decoded(const ChannelSchema& channel, const Channel& original, const 
 
 class TileChannels {
  public:
-  TileChannels(const PointCloud& tile, const MapSchema& schema, const NearestPair& near, Effort effort)
+  TileChannels(const PointCloud& tile, const MapSchema& schema, const NearestPair& near, Effort effort,
+               double color_loss)
       : tile_(tile),
         schema_(schema),
         near_(near),
         effort_(effort),
+        color_loss_(color_loss),
         coded_(coded_channels(schema, CodecId::surface)) {}
 
   /// Colour first: it decides on the voxels.
@@ -77,8 +79,9 @@ class TileChannels {
     }
     if (color < coded_.size()) {
       const std::size_t c = coded_[color];
-      MAPCODEC_ASSIGN(SurfaceColor e, encode_surface_color(schema_.channels[c], tile_.channels[c], near_,
-                                                           SamePositions(tile_.xyz), encoding, effort_));
+      MAPCODEC_ASSIGN(SurfaceColor e,
+                      encode_surface_color(schema_.channels[c], tile_.channels[c], near_,
+                                           SamePositions(tile_.xyz), encoding, effort_, color_loss_));
       r.channels[color] = std::move(e.bytes);
       r.errors.color_error = e.error;
       shift = e.voxel_shift;
@@ -107,19 +110,20 @@ class TileChannels {
   const MapSchema& schema_;
   const NearestPair& near_;
   Effort effort_;
+  double color_loss_;
   std::vector<std::size_t> coded_;
 };
 
 }  // namespace
 
 Result<SurfaceTile> encode_surface_tile(const PointCloud& tile, const MapSchema& schema, double step_m,
-                                        Effort effort) {
+                                        Effort effort, double color_loss) {
   const Quantizer lattice{schema.origin, step_m, schema.coordinates.kind};
   MAPCODEC_ASSIGN(SurfaceEncoding e, encode_surface(tile.xyz, lattice, {effort}));
   const NearestPair near = find_nearest_pair(tile.xyz, e.decoded);
   SurfaceTile r;
   measure(tile.xyz, e.decoded, near, r);
-  MAPCODEC_TRY(TileChannels(tile, schema, near, effort).encode(e, r));
+  MAPCODEC_TRY(TileChannels(tile, schema, near, effort, color_loss).encode(e, r));
   r.geometry = std::move(e.bytes);
   return r;
 }

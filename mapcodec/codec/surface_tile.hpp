@@ -22,6 +22,6 @@ struct SurfaceTile {
 /// @param step_m  surface step.
 /// Errors: InvalidArgument (as encode_surface and encode_channel).
 [[nodiscard]] Result<SurfaceTile> encode_surface_tile(const PointCloud& tile, const MapSchema& schema,
-                                                      double step_m, Effort effort);
+                                                      double step_m, Effort effort, double color_loss = 0);
 
 }  // namespace mapcodec

@@ -71,8 +71,9 @@ struct OnVoxels {
 class ColorControl {
  public:
   ColorControl(const ChannelSchema& channel, const Channel& original, const NearestPair& near,
-               const SamePositions& ties, const SurfaceEncoding& encoding, Effort effort)
+               const SamePositions& ties, const SurfaceEncoding& encoding, Effort effort, double loss)
       : channel_(channel),
+        loss_(loss),
         original_(original),
         near_(near),
         encoding_(encoding),
@@ -82,19 +83,23 @@ class ColorControl {
 
   Result<SurfaceColor> run() {
     const OnVoxels finest = on_voxels(surface::least_voxel_shift(encoding_.header.depth));
-    const double bound = std::max(channel_.bound, kAboveFloor * finest.floor);
+    const double bound = loss_ > 0 ? (loss_ + std::hypot(loss_, 2 * finest.floor)) / 2
+                                   : std::max(channel_.bound, kAboveFloor * finest.floor);
     const OnVoxels coarse = coarsest(bound * kFloorShare, finest);
     MAPCODEC_ASSIGN(SurfaceColor best, encode(coarse, bound));
-    if (effort_ == Effort::fast || coarse.shift == finest.shift) return best;
+    if (effort_ == Effort::fast) return best;
     // Rough colours leave more to code on coarse voxels than those save.
-    MAPCODEC_ASSIGN(SurfaceColor finer,
-                    encode(on_voxels(static_cast<std::uint8_t>(coarse.shift - 1)), bound));
-    return is_better(finer, best, bound) ? finer : best;
+    for (std::uint8_t shift = coarse.shift; shift > finest.shift;) {
+      MAPCODEC_ASSIGN(SurfaceColor finer, encode(on_voxels(--shift), bound));
+      if (!is_better(finer, best, bound)) break;
+      best = std::move(finer);
+    }
+    return best;
   }
 
  private:
   // What is left of the bound for coding when voxels are as coarse as they may be; found by measuring sizes.
-  static constexpr double kFloorShare = 0.85, kAboveFloor = 1.05;
+  static constexpr double kFloorShare = 0.95, kAboveFloor = 1.05;
   static constexpr int kTries = 4;
 
   static bool is_better(const SurfaceColor& a, const SurfaceColor& b, double bound) {
@@ -144,6 +149,7 @@ class ColorControl {
   }
 
   const ChannelSchema& channel_;
+  const double loss_;
   const Channel& original_;
   const NearestPair& near_;
   const SurfaceEncoding& encoding_;
@@ -216,8 +222,8 @@ double color_error_between(const Channel& original, const Channel& decoded, cons
 
 Result<SurfaceColor> encode_surface_color(const ChannelSchema& channel, const Channel& original,
                                           const NearestPair& near, const SamePositions& ties,
-                                          const SurfaceEncoding& encoding, Effort effort) {
-  return ColorControl(channel, original, near, ties, encoding, effort).run();
+                                          const SurfaceEncoding& encoding, Effort effort, double loss) {
+  return ColorControl(channel, original, near, ties, encoding, effort, loss).run();
 }
 
 }  // namespace mapcodec

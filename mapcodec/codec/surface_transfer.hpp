@@ -45,8 +45,13 @@ struct SurfaceColor {
 /// the bound allows, all points of one alike. If no colours on these positions meet the bound, a little above
 /// the least error.
 /// @param encoding  for its points; unchanged. @param near  of originals and encoding.decoded.
+/// @param loss  > 0: not the bound is the aim but the error D = (loss + sqrt(loss^2 + 4 least^2)) / 2, with
+/// the least error of these positions: D^2 = least^2 + x^2 is what a loss x of coding gives, and where bits
+/// fall with log x, x^2 = loss * D is where all tiles have one slope of bits against error. So rough tiles
+/// may be worse than the bound and smooth ones better, and the map takes fewer bits for the same mean.
 [[nodiscard]] Result<SurfaceColor> encode_surface_color(const ChannelSchema& channel, const Channel& original,
                                                         const NearestPair& near, const SamePositions& ties,
-                                                        const SurfaceEncoding& encoding, Effort effort);
+                                                        const SurfaceEncoding& encoding, Effort effort,
+                                                        double loss = 0);
 
 }  // namespace mapcodec

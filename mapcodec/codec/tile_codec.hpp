@@ -57,6 +57,9 @@ struct TileSettings {
   Effort effort = Effort::standard;
   bool keep_counts = true;  ///< points: voxels keep how many points they stood for
   double step_m = 0;        ///< points, surface: this tile's own step (written into it); 0: schema.step_m
+  /// surface: > 0: bounded colour is not coded to its bound but with this loss on top of the least error that
+  /// the tile's positions allow (see encode_surface_color). The map's bound is then the caller's to keep.
+  double color_loss = 0;
   PaperSettings paper;
 };
 

@@ -128,7 +128,8 @@ Result<EncodedTile> encode_with_channels(const PointCloud& tile, const MapSchema
 Result<EncodedTile> encode_by_surfaces(const PointCloud& tile, const MapSchema& schema,
                                        const TileSettings& settings) {
   const double step_m = step_of(schema, settings);
-  MAPCODEC_ASSIGN(const SurfaceTile t, encode_surface_tile(tile, schema, step_m, settings.effort));
+  MAPCODEC_ASSIGN(const SurfaceTile t,
+                  encode_surface_tile(tile, schema, step_m, settings.effort, settings.color_loss));
   ByteWriter out;
   EncodedTile r = begin_tile(tile, schema, CodecId::surface, tile.size(), step_m, out);
   append_section(out, t.geometry, t.channels.empty());

@@ -72,7 +72,8 @@ void add_coding(CLI::App& verb, Arguments& a) {
   CompressOptions& o = a.options;
   verb.add_option("--color-error", o.color_error, "Mean RGB distance allowed, 0..255; 0 = exact")
       ->check(CLI::NonNegativeNumber)
-      ->capture_default_str();
+      ->capture_default_str()
+      ->each([&o](const std::string&) { o.color_error_asked = true; });
   verb.add_option("--channels", a.channels, "all, none, or names separated by commas")->capture_default_str();
   verb.add_option("--tile-size", o.tile_size_m,
                   "Side of a tile [m]; default from the density, 100k points, 600k of surfaces")
