@@ -49,6 +49,7 @@ int main(int argc, char** argv) {
   add_crop(app, action);
   add_pose(app, action);
   add_merge(app, action);
+  add_flatten(app, action);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {

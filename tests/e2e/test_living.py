@@ -112,6 +112,18 @@ class Living(ProgramTest):
         self.assertEqual(other.read_bytes(), kept)
         self.fails((USAGE, BAD_INPUT), "merge", self.map, self.map)
 
+    def test_flatten(self):
+        self.succeeds("compress", self.first, "-o", self.map, "--max-error", 0.005)
+        self.succeeds("update", self.map, self.second, "--submap", "room 2", "--pose", "100,0,0,0,0,1,0")
+        flat = self.path("flat.mapc")
+        self.succeeds("flatten", self.map, "-o", flat)
+        info = self.succeeds("info", flat, "--json").json
+        self.assertEqual((info["points"], info["submaps"]), (8000, 1))
+        apart = self.succeeds("evaluate", self.map, flat, "--json").json
+        self.assertLessEqual(apart["max_axis_error_m"], 0.0051)
+        self.fails(CANNOT_WRITE, "flatten", self.map, "-o", flat, names=flat)
+        self.fails(BAD_INPUT, "flatten", self.path("no.mapc"), "-o", self.path("x.mapc"), names="no.mapc")
+
     def test_history(self):
         self.succeeds("compress", self.first, "-o", self.map, "--max-error", 0.005)
         self.succeeds("snapshot", self.map, "before")

@@ -27,6 +27,7 @@ void add_update(CLI::App& app, Action& action);
 void add_remove(CLI::App& app, Action& action);
 void add_crop(CLI::App& app, Action& action);
 void add_pose(CLI::App& app, Action& action);
+void add_flatten(CLI::App& app, Action& action);
 void add_merge(CLI::App& app, Action& action);
 
 }  // namespace mapcodec::cli
