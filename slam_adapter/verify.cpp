@@ -136,7 +136,9 @@ Result<VerifyOutcome> verify_map(const std::string& path, const ReadSettings& se
   MAPCODEC_ASSIGN(const VerifyReport report, verify_archive(path));
   if (!report.ok()) return report.findings.front();
   MAPCODEC_ASSIGN(const MapFile map, MapFile::open(path));
-  return check_tiles(map, settings);
+  MAPCODEC_ASSIGN(VerifyOutcome v, check_tiles(map, settings));
+  v.trailing_bytes = report.trailing_bytes;
+  return v;
 }
 
 Result<VerifyOutcome> verify_map_against(const std::string& path, const std::vector<std::string>& originals,

@@ -12,6 +12,7 @@ namespace mapcodec {
 struct VerifyOutcome {
   std::uint64_t tiles = 0, points = 0;
   std::optional<Evaluation> evaluation;  ///< with an original and a lossy promise
+  std::uint64_t trailing_bytes = 0;      ///< of an update that was not finished, or not yet
   bool promise_kept = true;              ///< true without an original
   std::vector<std::string> findings;     ///< one sentence per broken promise
 };

@@ -29,7 +29,8 @@ class Kills(ProgramTest):
             out, err = child.communicate()
             killed += child.returncode < 0
             self.assertIn(child.returncode, (DONE, -9), err)
-            self.assertEqual(run("verify", archive).code, DONE)
+            verified = run("verify", archive)
+            self.assertEqual(verified.code, DONE, f"{work[0]} {i}: {verified}")
             after = self.succeeds("info", archive, "--json").json
             self.assertGreaterEqual(after["revision"], before["revision"])
             self.assertGreaterEqual(after["points"], before["points"])

@@ -24,6 +24,7 @@ Json outcome_json(const VerifyOutcome& v) {
   j["ok"] = v.promise_kept;
   j["tiles"] = v.tiles;
   j["points"] = v.points;
+  j["unfinished_bytes"] = v.trailing_bytes;
   j["findings"] = v.findings;
   if (v.evaluation) j["evaluation"] = evaluation_json(*v.evaluation, 0, 0);
   return j;
@@ -44,6 +45,9 @@ int run(const Arguments& a) {
   if (!a.json) {
     fmt::print("{}: sound, {} tiles, {} points{}\n", a.map, v->tiles, human_count(v->points),
                a.originals.empty() ? "" : ", promise kept");
+    if (v->trailing_bytes > 0)
+      fmt::print("{} of an unfinished update follow; the next writer drops them\n",
+                 human_bytes(v->trailing_bytes));
     if (v->evaluation) print_evaluation(*v->evaluation);
   }
   return kDone;
