@@ -46,9 +46,10 @@ class Verifier {
     auto last = find_last_commit(store_);
     if (!last.ok()) return note(last.error());
     report_.trailing_bytes = report_.file_bytes - std::min(report_.file_bytes, last->end());
-    // Others are those of a writer at work, or of one that died: nothing that was committed is missing.
-    if (report_.trailing_bytes > 0 && ends_like_commit(store_))
-      found("a commit after the last whole one is damaged", last->end());
+    if (report_.trailing_bytes > 0) {
+      report_.lost_newest = ends_like_commit(store_);
+      found("bytes after the last whole commit", last->end());
+    }
     report_.checked_bytes += kHeaderBytes;
     MAPCODEC_ASSIGN(std::vector<std::uint64_t> offsets, list_commits(*std::move(last)));
     ArchiveState state;

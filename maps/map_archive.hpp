@@ -26,10 +26,16 @@ struct VerifyReport {
   std::uint64_t dead_bytes = 0;     ///< segments that only other revisions use, and ranges that none uses
   std::uint64_t trailing_bytes =
       0;  ///< after the last whole commit: an unfinished one, or a damaged last one (a finding)
+  bool lost_newest = false;  ///< those bytes end like a commit that was whole once
   std::uint64_t revisions = 0;
   std::uint64_t segments = 0;
 
   [[nodiscard]] bool ok() const { return findings.empty(); }
+  /// True if all that was found is the tail of a commit that was not finished, or not yet: a writer at work
+  /// or one that was killed leaves it, and nothing that was committed is missing.
+  [[nodiscard]] bool only_unfinished() const {
+    return findings.size() == 1 && trailing_bytes > 0 && !lost_newest;
+  }
 };
 
 /// Reads need no lock: a writer in another process may append meanwhile, and this object stays at its

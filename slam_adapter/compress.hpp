@@ -22,8 +22,8 @@ struct CompressOptions {
   CodecChoice codecs =
       CodecChoice::cheapest;  ///< of an rms promise: for each tile the cheapest, or one for all
   double color_error = 10;    ///< mean RGB distance allowed, 0..255; 0 = exact
-  /// The bound was asked for, not left at its default: where resampled positions cannot keep it, they are made
-  /// finer. Otherwise what is reachable is recorded as the bound, with a warning.
+  /// The bound was asked for, not left at its default: where resampled positions cannot keep it, they are
+  /// made finer. Otherwise what is reachable is recorded as the bound, with a warning.
   bool color_error_asked = false;
   std::vector<std::string> channels{"all"};  ///< "all", "none" or names
   double tile_size_m = 0;  ///< 0: from the density, 100,000 points a tile, 600,000 of surfaces

@@ -134,7 +134,7 @@ Result<VerifyOutcome> verify_map(const std::string& path, const ReadSettings& se
   // An archive whose last commit is damaged still opens, at the one before: the whole file is looked at
   // first.
   MAPCODEC_ASSIGN(const VerifyReport report, verify_archive(path));
-  if (!report.ok()) return report.findings.front();
+  if (!report.ok() && !report.only_unfinished()) return report.findings.front();
   MAPCODEC_ASSIGN(const MapFile map, MapFile::open(path));
   MAPCODEC_ASSIGN(VerifyOutcome v, check_tiles(map, settings));
   v.trailing_bytes = report.trailing_bytes;

@@ -72,7 +72,7 @@ TEST(MapRepair, ATornTailIsNoLoss) {
   Bytes bytes = read_file(path);
   bytes.insert(bytes.end(), 1000, 7);
   write_file(path, bytes);
-  EXPECT_TRUE(verify_archive(path)->ok());
+  EXPECT_FALSE(verify_archive(path)->ok());
   const auto report = repair_archive(path, fixed);
   EXPECT_TRUE(report->saved_all());
   EXPECT_TRUE(verify_archive(fixed)->ok());
@@ -110,6 +110,7 @@ TEST(MapRepair, EveryFlippedByteOfASmallArchive) {
     if (const auto archive = open_bytes(bytes); archive.ok()) {
       expect_nothing_false(*archive, history[archive->revision()]);
       EXPECT_FALSE(archive->verify()->ok());
+      EXPECT_FALSE(archive->verify()->only_unfinished());
       // A writer goes on from the last revision or refuses: it never cuts a commit off.
       const bool newest = archive->revision() == 3;
       EXPECT_EQ(archive->lost_newest(), !newest);
