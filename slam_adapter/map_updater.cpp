@@ -120,8 +120,13 @@ struct MapUpdater::State {
   TileErrors achieved;  // of the map, what came in since the last commit included
   std::uint64_t input_points = 0, stored_points = 0, input_bytes = 0;
   bool changed = false;
+  Status failed;  // the first error that came half way: from then on nothing is committed
 
   Status begin();
+  Status remember(Status s) {
+    if (!s.ok() && failed.ok()) failed = s;
+    return s;
+  }
   Status flush();
   void sort_into_tiles(std::map<Place, PointCloud, PlaceLess>& tiles, std::uint32_t submap,
                        const PointCloud&);
@@ -134,6 +139,7 @@ struct MapUpdater::State {
   void account(const TileWork& w);
   void trim_cache();
   Status run_all(std::size_t count, const std::function<Status(std::size_t)>& body);
+  Status erase(const std::optional<Erasure>& e, std::optional<std::uint32_t> submap);
   Status erase_in(const TileRecord& record, const Erasure& e);
   Result<Erasure> in_submap(const Erasure& e, std::uint32_t submap) const;
   Status fold(std::size_t least);
@@ -476,33 +482,36 @@ Status MapUpdater::insert(PointCloud points, std::uint32_t submap) {
   s.report.points_in += fitted.size();
   s.held_points += fitted.size();
   if (!fitted.empty()) s.held.emplace_back(submap, std::move(fitted));
-  return s.held_points >= s.settings.batch_points ? s.flush() : Status{};
+  return s.held_points >= s.settings.batch_points ? flush() : Status{};
 }
 
-Status MapUpdater::erase(const std::optional<Erasure>& e, std::optional<std::uint32_t> submap) {
-  State& s = *state_;
-  MAPCODEC_TRY(s.flush());
+Status MapUpdater::State::erase(const std::optional<Erasure>& e, std::optional<std::uint32_t> submap) {
   std::vector<Place> places;
-  for (const TileRecord* t : s.writer.tiles()) {
+  for (const TileRecord* t : writer.tiles()) {
     if (!submap || t->submap == *submap) places.push_back({t->submap, t->key});
   }
   for (const Place& p : places) {
-    MAPCODEC_TRY(s.stopped());
+    MAPCODEC_TRY(stopped());
     if (!e) {
-      s.changed = true;
-      ++s.report.tiles_removed;
-      s.cache.erase(p);
-      MAPCODEC_TRY(s.writer.remove(p.key, p.submap));
+      changed = true;
+      ++report.tiles_removed;
+      cache.erase(p);
+      MAPCODEC_TRY(writer.remove(p.key, p.submap));
       continue;
     }
-    MAPCODEC_ASSIGN(const Erasure local, s.in_submap(*e, p.submap));
-    const TileRecord* record = s.writer.find(p.key, p.submap);
+    MAPCODEC_ASSIGN(const Erasure local, in_submap(*e, p.submap));
+    const TileRecord* record = writer.find(p.key, p.submap);
     // Only the places that the conditions reach are looked at.
-    const Box reach = pose_of(s.writer.info(), p.submap).apply(record->bounds);
+    const Box reach = pose_of(writer.info(), p.submap).apply(record->bounds);
     const bool apart = e->box && !e->inverse && !p.key.is_unplaced() && !reach.intersects(*e->box);
-    if (!apart) MAPCODEC_TRY(s.erase_in(*record, local));
+    if (!apart) MAPCODEC_TRY(erase_in(*record, local));
   }
   return {};
+}
+
+Status MapUpdater::erase(const std::optional<Erasure>& e, std::optional<std::uint32_t> submap) {
+  MAPCODEC_TRY(flush());
+  return state_->remember(state_->erase(e, submap));
 }
 
 void MapUpdater::add_input_bytes(std::uint64_t bytes) {
@@ -514,14 +523,14 @@ Status MapUpdater::flush() {
 }
 
 Status MapUpdater::fold(std::size_t least) {
-  MAPCODEC_TRY(state_->flush());
-  return state_->fold(least);
+  MAPCODEC_TRY(flush());
+  return state_->remember(state_->fold(least));
 }
 
 Result<UpdateReport> MapUpdater::commit(std::int64_t timestamp_s) {
   State& s = *state_;
-  MAPCODEC_TRY(s.flush());
-  if (s.settings.fold_after > 0) MAPCODEC_TRY(s.fold(s.settings.fold_after));
+  MAPCODEC_TRY(flush());
+  if (s.settings.fold_after > 0) MAPCODEC_TRY(fold(s.settings.fold_after));
   UpdateReport report = std::exchange(s.report, {});
   report.revision = s.writer.revision();
   if (!s.changed) return report;

@@ -40,8 +40,10 @@ struct UpdateReport {
   std::uint64_t bytes = 0;  ///< of new segments
 };
 
-/// One writer of one archive. Insertions are held, coded in batches, and count after `commit`; destruction
-/// without it leaves the archive at its last revision. Threads: one at a time; the work uses the arena's.
+/// What failed half way is never committed: after an error of flush, erase or fold every further call returns
+/// it. One writer of one archive. Insertions are held, coded in batches, and count after `commit`;
+/// destruction without it leaves the archive at its last revision. Threads: one at a time; the work uses the
+/// arena's.
 class MapUpdater {
  public:
   /// @param arena  must outlive the updater.

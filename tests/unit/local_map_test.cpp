@@ -223,11 +223,15 @@ TEST(LocalMap, FetchesWhatLiesAhead) {
   EXPECT_FALSE(columns(*local->view()).contains(6));
 }
 
-TEST(LocalMap, NeverMoreThanTheBudget) {
-  const TemporaryFolder folder;
+TestMap long_map(const TemporaryFolder& folder) {
   MapSpec spec;
   spec.columns = 40;
-  const TestMap map = write_test_map(folder.path("m.mapc"), spec);
+  return write_test_map(folder.path("m.mapc"), spec);
+}
+
+TEST(LocalMap, NeverMoreThanTheBudget) {
+  const TemporaryFolder folder;
+  const TestMap map = long_map(folder);
   Arena arena(2);
   LocalMapSettings s = around(12);
   s.memory_bytes = 600'000;
@@ -243,9 +247,7 @@ TEST(LocalMap, NeverMoreThanTheBudget) {
 
 TEST(LocalMap, ViewsThatAreHeldCount) {
   const TemporaryFolder folder;
-  MapSpec spec;
-  spec.columns = 40;
-  const TestMap map = write_test_map(folder.path("m.mapc"), spec);
+  const TestMap map = long_map(folder);
   Arena arena(2);
   LocalMapSettings s = around(12);
   s.memory_bytes = 500'000;

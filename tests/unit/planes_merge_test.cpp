@@ -145,7 +145,10 @@ TEST(Cylinders, APipeIsOneAndABoxIsNone) {
   CylinderSettings settings;
   settings.tolerance_m = 0.005;
   const auto cylinders = find_cylinders(pipe, planes, settings);
-  if (!cylinders.ok()) GTEST_SKIP() << cylinders.error().message;
+  // Only a build without CGAL has no cylinders.
+  if (!cylinders.ok() && cylinders.error().code == ErrorCode::kUnsupported)
+    GTEST_SKIP() << cylinders.error().message;
+  ASSERT_TRUE(cylinders.ok()) << cylinders.error().message;
   ASSERT_EQ(cylinders->size(), 1u);
   const MapCylinder& c = (*cylinders)[0];
   EXPECT_NEAR(c.radius_m, r, 0.005);

@@ -55,15 +55,6 @@ Result<PoseChange> parse_pose(const std::string& text) {
   return p;
 }
 
-Result<Box> parse_box(const std::string& text) {
-  MAPCODEC_ASSIGN(const std::vector<double> v, parse_numbers(text, 6));
-  for (std::size_t d = 0; d < 3; ++d) {
-    if (!(v[d] <= v[d + 3]))
-      return make_error(ErrorCode::kInvalidArgument, "--box has a minimum above its maximum");
-  }
-  return Box{{v[0], v[1], v[2]}, {v[3], v[4], v[5]}};
-}
-
 void print_change(const std::string& map, const UpdateReport& report,
                   const std::vector<std::string>& warnings, double seconds, bool json) {
   for (const std::string& warning : warnings) spdlog::warn("note: {}", warning);

@@ -15,9 +15,6 @@ namespace mapcodec::cli {
 /// "x,y,z,qx,qy,qz,qw". Errors: InvalidArgument (count, not finite, quaternion not of length 1 within 1e-3;
 /// it is normalised).
 [[nodiscard]] Result<PoseChange> parse_pose(const std::string& text);
-/// "x0,y0,z0,x1,y1,z1". Errors: InvalidArgument.
-[[nodiscard]] Result<Box> parse_box(const std::string& text);
-
 /// Prints what a change did: JSON, or a line for people; warnings on stderr.
 void print_change(const std::string& map, const UpdateReport& report,
                   const std::vector<std::string>& warnings, double seconds, bool json);

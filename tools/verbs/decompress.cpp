@@ -25,17 +25,10 @@ struct Arguments {
 Result<Region> region_of(const Arguments& a) {
   Region r;
   if (!a.box.empty()) {
-    MAPCODEC_ASSIGN(const std::vector<double> v, parse_numbers(a.box, 6));
-    r.box = Box{{v[0], v[1], v[2]}, {v[3], v[4], v[5]}};
-    for (std::size_t d = 0; d < 3; ++d) {
-      if (v[d] > v[d + 3])
-        return make_error(ErrorCode::kInvalidArgument, "--box has a minimum above its maximum");
-    }
+    MAPCODEC_ASSIGN(r.box, parse_box(a.box));
   }
   if (!a.sphere.empty()) {
-    MAPCODEC_ASSIGN(const std::vector<double> v, parse_numbers(a.sphere, 4));
-    if (v[3] < 0) return make_error(ErrorCode::kInvalidArgument, "--sphere has a negative radius");
-    r.sphere = Region::Sphere{{v[0], v[1], v[2]}, v[3]};
+    MAPCODEC_ASSIGN(r.sphere, parse_sphere(a.sphere));
   }
   return r;
 }

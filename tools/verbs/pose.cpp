@@ -80,7 +80,8 @@ int run(const Arguments& a) {
   if (a.json) {
     fmt::print("{}\n", json_text(Json{{"revision", *revision}, {"poses", named->size()}}));
   } else {
-    fmt::print("{}: revision {}, {} poses set\n", a.map, *revision, human_count(named->size()));
+    fmt::print("{}: revision {}, {} set\n", a.map, *revision,
+               named->size() == 1 ? "1 pose" : human_count(named->size()) + " poses");
   }
   return kDone;
 }

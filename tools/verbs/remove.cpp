@@ -37,9 +37,8 @@ Result<std::optional<Erasure>> erasure_of(const Arguments& a) {
     MAPCODEC_ASSIGN(e.box, parse_box(a.box));
   }
   if (!a.sphere.empty()) {
-    MAPCODEC_ASSIGN(const std::vector<double> v, parse_numbers(a.sphere, 4));
-    if (v[3] < 0) return make_error(ErrorCode::kInvalidArgument, "--sphere has a negative radius");
-    e.sphere = Erasure::Sphere{{v[0], v[1], v[2]}, v[3]};
+    MAPCODEC_ASSIGN(const Region::Sphere s, parse_sphere(a.sphere));
+    e.sphere = Erasure::Sphere{s.centre, s.radius_m};
   }
   if (!a.where.empty()) {
     MAPCODEC_ASSIGN(e.values, parse_values(a.where));

@@ -395,6 +395,21 @@ Result<std::vector<double>> parse_numbers(const std::string& text, std::size_t c
   return numbers;
 }
 
+Result<Box> parse_box(const std::string& text) {
+  MAPCODEC_ASSIGN(const std::vector<double> v, parse_numbers(text, 6));
+  for (std::size_t d = 0; d < 3; ++d) {
+    if (!(v[d] <= v[d + 3]))
+      return make_error(ErrorCode::kInvalidArgument, "--box has a minimum above its maximum");
+  }
+  return Box{{v[0], v[1], v[2]}, {v[3], v[4], v[5]}};
+}
+
+Result<Region::Sphere> parse_sphere(const std::string& text) {
+  MAPCODEC_ASSIGN(const std::vector<double> v, parse_numbers(text, 4));
+  if (v[3] < 0) return make_error(ErrorCode::kInvalidArgument, "--sphere has a negative radius");
+  return Region::Sphere{{v[0], v[1], v[2]}, v[3]};
+}
+
 bool path_exists(const std::string& path) {
   std::error_code ignored;
   return std::filesystem::exists(path, ignored);

@@ -61,6 +61,11 @@ void print_evaluation(const Evaluation& e);
 /// "a,b,c" -> `count` numbers. InvalidArgument otherwise.
 [[nodiscard]] Result<std::vector<double>> parse_numbers(const std::string& text, std::size_t count);
 
+/// "x0,y0,z0,x1,y1,z1" [m]. InvalidArgument otherwise, and for a minimum above its maximum.
+[[nodiscard]] Result<Box> parse_box(const std::string& text);
+/// "x,y,z,r" [m]. InvalidArgument otherwise, and for a negative radius.
+[[nodiscard]] Result<Region::Sphere> parse_sphere(const std::string& text);
+
 [[nodiscard]] bool path_exists(const std::string& path);
 
 /// Reads a cloud or a map, whole, with its file's and raw size.
