@@ -12,12 +12,22 @@
 
 namespace mapcodec {
 
+/// What of a ROS bag is read, and where it goes. Other formats ignore it.
+struct BagOptions {
+  /// automatic: tf where it knows a pose for the clouds, else odometry, else none.
+  enum class Poses : std::uint8_t { automatic, tf, odometry, none };
+  std::vector<std::string> topics;  ///< of sensor_msgs/PointCloud2; empty: all
+  Poses poses = Poses::automatic;
+  std::string frame;  ///< that becomes the map's; empty: the root of the tree in which the sensor hangs
+};
+
 struct ReadOptions {
   bool keep_nonfinite =
       false;  ///< keep points with a NaN or infinite coordinate instead of dropping and counting them
   /// Metres per unit of the file: multiplies x, y, z (3DTK's centimetres: 0.01). Anything but 1 makes the
   /// coordinates f64, since a product is no longer a number that the file stored.
   double unit_m = 1;
+  BagOptions bag;
 };
 
 /// Opens a point file as blocks of at most 65,536 points.

@@ -8,6 +8,9 @@
 #include "slam_adapter/formats/scan_folder.hpp"
 #include "slam_adapter/formats/text_table.hpp"
 #include "slam_adapter/formats/vtk.hpp"
+#ifdef MAPCODEC_ROSBAG
+#include "slam_adapter/rosbag/bag_scans.hpp"
+#endif
 
 namespace mapcodec {
 namespace {
@@ -53,7 +56,11 @@ Status check_not_empty(const ByteStream& stream) {
 Result<std::unique_ptr<PointSource>> open_stream(std::unique_ptr<ByteStream> stream, std::string name,
                                                  const ReadOptions& options) {
   if (const Status s = check_not_empty(*stream); !s.ok()) return named(name, s.error());
-  auto reader = open_reader(*stream, recognise(*stream, name));
+  const Format format = recognise(*stream, name);
+#ifdef MAPCODEC_ROSBAG
+  if (format == Format::rosbag) return open_bag(std::move(stream), name, options);
+#endif
+  auto reader = open_reader(*stream, format);
   if (!reader.ok()) return named(name, reader.error());
   return make_source(std::move(stream), std::move(reader).value(), std::move(name), options);
 }
