@@ -47,6 +47,7 @@ Result<CompressReport> compress_files(const std::vector<std::string>& inputs, co
   ReadOptions read;
   read.keep_nonfinite = options.promise == PromiseKind::lossless;
   read.unit_m = options.unit_m;
+  read.bag = options.bag;
   MAPCODEC_ASSIGN(const std::unique_ptr<PointSource> source,
                   open_inputs(inputs, read, options.promise == PromiseKind::lossless));
   for (const std::string& input : inputs) {

@@ -11,6 +11,7 @@
 #include "maps/map_archive.hpp"
 #include "parallel/progress.hpp"
 #include "slam_adapter/coding_plan.hpp"
+#include "slam_adapter/formats/bag_options.hpp"
 
 namespace mapcodec {
 
@@ -32,6 +33,7 @@ struct CompressOptions {
   bool keep_counts = true;  ///< false: points in one voxel become one
   PaperSettings paper;
   double unit_m = 1;                   ///< metres per unit of the input files (3DTK's centimetres: 0.01)
+  BagOptions bag;                      ///< of ROS bags among the input files
   int threads = 0;                     ///< 0: all
   std::uint64_t max_memory_bytes = 0;  ///< 0: half of the machine's memory
   std::string temp_folder;             ///< spill files; empty: the output's folder

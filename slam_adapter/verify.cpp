@@ -8,11 +8,12 @@ namespace mapcodec {
 namespace {
 
 Result<std::unique_ptr<PointSource>> open_originals(const std::vector<std::string>& paths,
-                                                    bool keep_nonfinite) {
+                                                    const BagOptions& bag, bool keep_nonfinite) {
   std::vector<std::unique_ptr<PointSource>> sources;
   for (const std::string& path : paths) {
     ReadOptions options;
     options.keep_nonfinite = keep_nonfinite;
+    options.bag = bag;
     MAPCODEC_ASSIGN(std::unique_ptr<PointSource> source, open_source(path, options));
     sources.push_back(std::move(source));
   }
@@ -54,9 +55,9 @@ PointCloud without_order(PointCloud cloud) {
   return cloud;
 }
 
-Status check_lossless(const MapFile& map, const std::vector<std::string>& originals,
+Status check_lossless(const MapFile& map, const std::vector<std::string>& originals, const BagOptions& bag,
                       const ReadSettings& settings, VerifyOutcome& v) {
-  MAPCODEC_ASSIGN(const std::unique_ptr<PointSource> source, open_originals(originals, true));
+  MAPCODEC_ASSIGN(const std::unique_ptr<PointSource> source, open_originals(originals, bag, true));
   MAPCODEC_ASSIGN(const MultisetHash original, hash_of(*source, map.schema().layout()));
   MultisetHash decoded;
   MAPCODEC_TRY(map.read(Region{}, settings, [&](PointCloud&& cloud) {
@@ -92,9 +93,9 @@ void check_promise(const MapSchema& schema, VerifyOutcome& v) {
   }
 }
 
-Status check_lossy(const MapFile& map, const std::vector<std::string>& originals,
+Status check_lossy(const MapFile& map, const std::vector<std::string>& originals, const BagOptions& bag,
                    const ReadSettings& settings, VerifyOutcome& v) {
-  MAPCODEC_ASSIGN(const std::unique_ptr<PointSource> source, open_originals(originals, false));
+  MAPCODEC_ASSIGN(const std::unique_ptr<PointSource> source, open_originals(originals, bag, false));
   PointCloud original = source->layout(), block;
   for (;;) {
     MAPCODEC_ASSIGN(const bool more, source->next(block));
@@ -142,11 +143,11 @@ Result<VerifyOutcome> verify_map(const std::string& path, const ReadSettings& se
 }
 
 Result<VerifyOutcome> verify_map_against(const std::string& path, const std::vector<std::string>& originals,
-                                         const ReadSettings& settings) {
+                                         const ReadSettings& settings, const BagOptions& bag) {
   MAPCODEC_ASSIGN(VerifyOutcome v, verify_map(path, settings));
   MAPCODEC_ASSIGN(const MapFile map, MapFile::open(path));
-  MAPCODEC_TRY(map.schema().promise == PromiseKind::lossless ? check_lossless(map, originals, settings, v)
-                                                             : check_lossy(map, originals, settings, v));
+  MAPCODEC_TRY(map.schema().promise == PromiseKind::lossless ? check_lossless(map, originals, bag, settings, v)
+                                                             : check_lossy(map, originals, bag, settings, v));
   return v;
 }
 

@@ -3,6 +3,7 @@
 
 #include "slam_adapter/formats/detect.hpp"
 #include "slam_adapter/formats/las.hpp"
+#include "slam_adapter/formats/laz.hpp"
 #include "slam_adapter/formats/pcd.hpp"
 #include "slam_adapter/formats/ply.hpp"
 #include "slam_adapter/formats/scan_folder.hpp"
@@ -28,6 +29,8 @@ ReaderResult open_reader(const ByteStream& stream, Format format) {
       return open_ply(stream);
     case Format::las:
       return open_las(stream);
+    case Format::laz:
+      return open_laz(stream);
     case Format::vtk:
       return open_vtk(stream);
     case Format::pts:
