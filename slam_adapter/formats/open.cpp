@@ -9,6 +9,9 @@
 #include "slam_adapter/formats/scan_folder.hpp"
 #include "slam_adapter/formats/text_table.hpp"
 #include "slam_adapter/formats/vtk.hpp"
+#ifdef MAPCODEC_E57
+#include "slam_adapter/e57/e57.hpp"
+#endif
 #ifdef MAPCODEC_ROSBAG
 #include "slam_adapter/rosbag/bag_scans.hpp"
 #endif
@@ -29,6 +32,10 @@ ReaderResult open_reader(const ByteStream& stream, Format format) {
       return open_ply(stream);
     case Format::las:
       return open_las(stream);
+#ifdef MAPCODEC_E57
+    case Format::e57:
+      return open_e57(stream);
+#endif
     case Format::laz:
       return open_laz(stream);
     case Format::vtk:
