@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <filesystem>
 
+#include "slam_adapter/autoware/autoware_folder.hpp"
 #include "slam_adapter/formats/detect.hpp"
 #include "slam_adapter/formats/las.hpp"
 #include "slam_adapter/formats/laz.hpp"
@@ -84,6 +85,7 @@ std::string format_name(Format format, const std::string& path) {
 
 Result<std::unique_ptr<PointSource>> open_source(const std::string& path, const ReadOptions& options) {
   if (is_folder(path) && is_scan_folder(path)) return open_scan_folder(path, options);
+  if (is_autoware_folder(path)) return open_autoware_folder(path, options);
   auto stream = file_stream(path);
   if (!stream.ok()) return named(path, stream.error());
   return open_stream(std::move(stream).value(), path, options);
@@ -96,6 +98,7 @@ Result<std::unique_ptr<PointSource>> open_source_memory(ByteSpan bytes, std::str
 
 Result<std::string> detect_format(const std::string& path) {
   if (is_folder(path) && is_scan_folder(path)) return std::string("3DTK");
+  if (is_autoware_folder(path)) return std::string("Autoware");
   auto stream = file_stream(path);
   if (!stream.ok()) return named(path, stream.error());
   if (const Status s = check_not_empty(**stream); !s.ok()) return named(path, s.error());
@@ -107,6 +110,7 @@ Result<std::string> detect_format(const std::string& path) {
 
 Result<std::uint64_t> input_bytes(const std::string& path) {
   if (is_folder(path) && is_scan_folder(path)) return scan_folder_bytes(path);
+  if (is_autoware_folder(path)) return autoware_folder_bytes(path);
   auto stream = file_stream(path);
   if (!stream.ok()) return named(path, stream.error());
   return (*stream)->size();

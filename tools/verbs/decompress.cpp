@@ -2,9 +2,11 @@
 #include "slam_adapter/decompress.hpp"
 
 #include <spdlog/fmt/fmt.h>
+#include <spdlog/spdlog.h>
 
 #include <memory>
 
+#include "slam_adapter/autoware/autoware_folder.hpp"
 #include "slam_adapter/planes_file.hpp"
 #include "tools/verbs/report.hpp"
 #include "tools/verbs/verbs.hpp"
@@ -17,6 +19,7 @@ struct Arguments {
   std::optional<std::uint64_t> revision;
   std::optional<unsigned> level;
   SurfaceOptions surfaces;
+  AutowareExport autoware;
   int threads = 0;
   bool json = false, force = false;
   WriteOptions write;
@@ -95,6 +98,25 @@ int write_points(const Arguments& a, const Region& region, const ReadSettings& s
   return kDone;
 }
 
+int write_autoware(const Arguments& a, const Region& region, const ReadSettings& settings) {
+  AutowareExport options = a.autoware;
+  options.write = a.write;
+  options.overwrite = a.force;
+  const auto r = export_autoware(a.map, a.output, region, a.revision, settings, options);
+  if (!r.ok()) return fail_decompress(a, r.error());
+  for (const std::string& warning : r->warnings) spdlog::warn("note: {}", warning);
+  if (a.json) {
+    Json j = report_json(*r);
+    j["tiles_written"] = r->tiles;
+    j["warnings"] = r->warnings;
+    fmt::print("{}\n", j.dump(2));
+  } else {
+    fmt::print("{}: {} points in {} tiles of {:g} m, {:.3f} s\n", a.output, human_count(r->points), r->tiles,
+               options.tile_size_m, r->seconds);
+  }
+  return kDone;
+}
+
 int write_surfaces(const Arguments& a, const Region& region, const ReadSettings& settings) {
   const bool planes = a.as == "planes";
   SurfaceOptions options = a.surfaces;
@@ -118,8 +140,9 @@ int write_surfaces(const Arguments& a, const Region& region, const ReadSettings&
 std::string contradiction(const Arguments& a) {
   if (a.as != "points" && a.level) return "--level is for --as points";
   if (a.as != "planes" && a.surfaces.cylinders) return "--cylinders is for --as planes";
-  if (a.as != "points" && a.write.compressed) return "--binary-compressed is for --as points";
-  if (a.as == "points" && a.surfaces.tolerance_m > 0) return "--tolerance is for --as planes or mesh";
+  if (a.as != "points" && a.as != "autoware" && a.write.compressed)
+    return "--binary-compressed is for --as points or autoware";
+  if ((a.as == "points" || a.as == "autoware") && a.surfaces.tolerance_m > 0) return "--tolerance is for --as planes or mesh";
   return {};
 }
 
@@ -130,7 +153,7 @@ int run(Arguments& a) {
   }
   const auto region = region_of(a);
   if (!region.ok()) return fail("decompress", region.error());
-  if (!a.force && path_exists(a.output)) {
+  if (!a.force && a.as != "autoware" && path_exists(a.output)) {
     return fail(a.output, make_error(ErrorCode::kCannotWrite, "exists already (--force replaces it)"));
   }
   if (!a.revision_name.empty()) {
@@ -145,6 +168,7 @@ int run(Arguments& a) {
   settings.progress = progress_printer(a.progress);
   settings.stop = stop_flag();
   settings.level = a.level;
+  if (a.as == "autoware") return write_autoware(a, *region, settings);
   return (a.as == "points" ? write_points : write_surfaces)(a, *region, settings);
 }
 
@@ -155,7 +179,7 @@ void add_decompress(CLI::App& app, Action& action) {
   CLI::App* verb = app.add_subcommand("decompress", "An archive in; points, planes or a mesh out");
   verb->add_option("MAP", a->map, "The archive")->required();
   verb->add_option("-o,--output", a->output,
-                   "File to write: .pcd .ply .las .xyz .txt .pts .bin .vtk; planes: JSON; mesh: .ply")
+                   "File to write: .pcd .ply .las .xyz .txt .pts .bin .vtk; planes: JSON; mesh: .ply; autoware: a folder")
       ->required();
   auto* box = verb->add_option("--box", a->box, "Only points in x0,y0,z0,x1,y1,z1 [m]");
   verb->add_option("--sphere", a->sphere, "Only points in x,y,z,r [m]")->excludes(box);
@@ -165,8 +189,11 @@ void add_decompress(CLI::App& app, Action& action) {
                    "Points in less detail: cells of the tile size halved N times (info lists the levels); "
                    "without channels")
       ->check(CLI::Range(0u, kMostTileLevel));
-  verb->add_option("--as", a->as, "points, planes (JSON) or mesh (PLY with faces)")
-      ->check(CLI::IsMember({"points", "planes", "mesh"}));
+  verb->add_option("--as", a->as, "points, planes (JSON), mesh (PLY with faces) or autoware (a map folder)")
+      ->check(CLI::IsMember({"points", "planes", "mesh", "autoware"}));
+  verb->add_option("--tile-size-xy", a->autoware.tile_size_m, "--as autoware: sides of its tiles [whole m]")
+      ->check(CLI::Range(1.0, 1e6))
+      ->capture_default_str();
   verb->add_option(
           "--tolerance", a->surfaces.tolerance_m,
           "How far a plane's pieces may lie off it, and how wide the slits of a mesh that are closed "
