@@ -16,6 +16,7 @@
 #include "mapcodec/codec/tile_segments.hpp"
 #include "mapcodec/geometry/morton.hpp"
 #include "maps/map_writer.hpp"
+#include "tests/fuzz/file_seeds.hpp"
 #include "tests/fuzz/seeds.hpp"
 
 namespace mapcodec::fuzz {
@@ -162,6 +163,9 @@ int main(int argc, char** argv) {
   mapcodec::fuzz::archive_seed(folder, 1, 1);
   mapcodec::fuzz::archive_seed(folder, 5, 1);
   mapcodec::fuzz::archive_seed(folder, 3, 2);
+#ifdef MAPCODEC_FILE_SEEDS
+  mapcodec::fuzz::file_seeds(folder);
+#endif
   std::printf("%zu seeds in %s\n", folder.count(), argv[1]);
   return folder.good() ? 0 : 1;
 }
