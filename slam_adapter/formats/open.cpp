@@ -8,6 +8,7 @@
 #include "slam_adapter/formats/scan_folder.hpp"
 #include "slam_adapter/formats/text_table.hpp"
 #include "slam_adapter/formats/vtk.hpp"
+#include "slam_adapter/mrpt/log_source.hpp"
 
 namespace mapcodec {
 namespace {
@@ -15,6 +16,11 @@ namespace {
 bool is_folder(const std::string& path) {
   std::error_code ignored;
   return std::filesystem::is_directory(path, ignored);
+}
+
+/// Read by a program of its own, from a file.
+bool is_mrpt(Format format) {
+  return format == Format::rawlog || format == Format::simplemap || format == Format::mrpt_object;
 }
 
 ReaderResult open_reader(const ByteStream& stream, Format format) {
@@ -39,6 +45,9 @@ ReaderResult open_reader(const ByteStream& stream, Format format) {
       break;
   }
   const FormatInfo& info = format_info(format);
+  if (is_mrpt(format))
+    return make_error(ErrorCode::kUnsupported,
+                      std::string("is an ") + info.name + ": give its path, not its bytes");
   const std::string what = format == Format::unknown
                                ? "is not recognised: "
                                : std::string("is ") + info.name + ", which is not supported yet: ";
@@ -69,6 +78,7 @@ Result<std::unique_ptr<PointSource>> open_source(const std::string& path, const 
   if (is_folder(path) && is_scan_folder(path)) return open_scan_folder(path, options);
   auto stream = file_stream(path);
   if (!stream.ok()) return named(path, stream.error());
+  if (is_mrpt(recognise(**stream, path))) return open_log(path, options);
   return open_stream(std::move(stream).value(), path, options);
 }
 
