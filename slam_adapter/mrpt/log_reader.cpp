@@ -144,7 +144,8 @@ class LogReader {
     return is_one_of(h.class_name, {"CSensoryFrame", "CSensorialFrame"}) && h.version == 2;
   }
 
-  Status end_of(const char* what) {
+  Status end_of(const ObjectHeader& h, const char* what) {
+    if (h.old) return {};
     const ByteSpan next = in_.peek(1);
     if (next.empty())
       return make_error(ErrorCode::kTruncated, std::string("ends within a ") + what, in_.position());
@@ -166,7 +167,7 @@ class LogReader {
       MAPCODEC_ASSIGN(const auto object, read_object());
       if (object) MAPCODEC_TRY(take(object));
     }
-    return end_of("CSensoryFrame");
+    return end_of(h, "CSensoryFrame");
   }
 
   Status keyframes(const ObjectHeader& h) {
@@ -187,13 +188,13 @@ class LogReader {
         if (frame) MAPCODEC_TRY(take(frame));
       }
     }
-    return end_of("CSimpleMap");
+    return end_of(h, "CSimpleMap");
   }
 
   /// A log that was written as one object: its entries follow, and its end later.
   Status whole_log(const ObjectHeader& h) {
     (void)read_count(h);
-    ++open_containers_;
+    open_containers_ += h.old ? 0 : 1;
     return {};
   }
 

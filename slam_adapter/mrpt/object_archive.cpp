@@ -81,19 +81,20 @@ void ObjectArchive::skip(std::size_t count) {
 }
 
 std::optional<ObjectHeader> ObjectArchive::header(std::size_t ahead) {
-  const ByteSpan all = peek(ahead + kLongestName + 6);
+  const ByteSpan all = peek(ahead + kLongestName + 8);
   if (all.size() <= ahead) return std::nullopt;
   const ByteSpan bytes = all.subspan(ahead);
-  const bool old = (bytes[0] & kNewFormat) == 0;  // before versions were written: a length of 4 bytes
-  const std::size_t length = bytes[0] & 0x7f, begin = old ? 4 : 1;
-  if (length > kLongestName || begin + length + (old ? 0 : 1) > bytes.size()) return std::nullopt;
+  const bool old = (bytes[0] & kNewFormat) == 0;
+  const std::size_t length = bytes[0] & 0x7f, begin = old ? 4 : 1, version = old ? 4 : 1;
+  if (length > kLongestName || begin + length + version > bytes.size()) return std::nullopt;
   if (old && (bytes[1] != 0 || bytes[2] != 0 || bytes[3] != 0)) return std::nullopt;
   const ByteSpan name = bytes.subspan(begin, length);
   if (!is_name(name)) return std::nullopt;
   ObjectHeader h;
   h.class_name.assign(name.begin(), name.end());
-  h.version = old ? 0 : bytes[begin + length];
-  h.length = begin + length + (old ? 0 : 1);
+  h.version = bytes[begin + length];
+  h.old = old;
+  h.length = begin + length + version;
   return h;
 }
 

@@ -16,6 +16,7 @@ namespace mapcodec {
 struct ObjectHeader {
   std::string class_name;
   std::uint8_t version = 0;
+  bool old = false;        ///< of MRPT before 0.5: numbers of 4 bytes, and no byte at the end of the object
   std::size_t length = 0;  ///< bytes of the header
 };
 
