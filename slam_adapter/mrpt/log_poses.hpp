@@ -43,6 +43,9 @@ class LogPoses {
   /// Frames must come in order. @return nothing where the source has no pose for it.
   [[nodiscard]] std::optional<MapPose> of(const RawlogFrame& frame);
   [[nodiscard]] PoseSource source() const { return source_; }
+  /// Of the last frame among the groups of observations; where the next ones begin.
+  [[nodiscard]] std::size_t place() const { return place_; }
+  void begin_at(std::size_t place) { place_ = place; }
 
  private:
   PoseSource source_ = PoseSource::none;
