@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "maps/compaction.hpp"
+#include "slam_adapter/formats/file_sink.hpp"
 #include "slam_adapter/mrpt/log_mapper.hpp"
 #include "tools/examples/registration.hpp"
 #include "tools/verbs/history.hpp"
@@ -20,7 +21,7 @@ struct Arguments {
   LogMapRequest request;
   std::optional<double> rms, max_error;
   bool lossless = false, json = false, keep_revisions = false;
-  std::string poses, channels = "all", max_memory, progress = "auto", effort = "default";
+  std::string poses, trajectory, channels = "all", max_memory, progress = "auto", effort = "default";
   double angle_degrees = 0, voxel_m = 0, reach_m = 0;
   int decimation = 1;
 };
@@ -106,6 +107,22 @@ Status complete(Arguments& a) {
   return choose_poses(a);
 }
 
+/// The keyframes' poses as TUM writes them: stamp, position, quaternion.
+Status write_trajectory(const MapFile& map, const std::string& path) {
+  std::string text = "# stamp x y z qx qy qz qw: T_map_vehicle of each keyframe\n";
+  for (const Submap& s : map.archive().info().submaps) {
+    if (s.name.empty()) continue;
+    const auto& [x, y, z] = s.translation_m;
+    const auto& [qx, qy, qz, qw] = s.rotation_xyzw;
+    text += fmt::format("{:.6f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f}\n", s.first_stamp_s, x, y, z,
+                        qx, qy, qz, qw);
+  }
+  OutputFile out;
+  MAPCODEC_TRY(out.open(path));
+  MAPCODEC_TRY(out.append(text));
+  return out.commit();
+}
+
 Json report_json(const MapFile& map, const LogMapReport& r) {
   Json j = info_json(map);
   j["keyframes"] = r.keyframes;
@@ -141,6 +158,9 @@ int run(Arguments& a) {
   }
   const auto map = MapFile::open(a.request.map);
   if (!map.ok()) return fail(a.request.map, map.error());
+  if (!a.trajectory.empty()) {
+    if (const Status s = write_trajectory(*map, a.trajectory); !s.ok()) return fail(a.trajectory, s.error());
+  }
   if (a.json) {
     fmt::print("{}\n", json_text(report_json(*map, *report)));
     return kDone;
@@ -159,6 +179,7 @@ void add_poses(CLI::App& verb, Arguments& a) {
       "what the log has");
   verb.add_option("--poses-file", a.request.pose_file,
                   "T_map_vehicle as TUM (8 columns), KITTI (12) or MRPT text (7, flat: 4), or a simplemap");
+  verb.add_option("--trajectory", a.trajectory, "Also writes the keyframes' poses here (TUM)");
   verb.add_option("--sensor", a.request.read.sensors, "Only observations with this label; may be repeated");
   verb.add_option("--decimation", a.decimation, "Of range images: one point per block of NxN pixels")
       ->check(CLI::Range(1, 64));
