@@ -78,6 +78,8 @@ Result<MapUpdater> create_map(const std::string& path, PointSource& first, const
   survey_settings.stop = options.stop;
   if (options.max_memory_bytes > 0) survey_settings.memory_budget_bytes = options.max_memory_bytes;
   MAPCODEC_ASSIGN(Survey look, survey(first, survey_settings));
+  if (!options.store_constants)
+    std::fill(look.constant_channels.begin(), look.constant_channels.end(), std::nullopt);
   const auto parent = std::filesystem::path(path).parent_path();
   MAPCODEC_ASSIGN(const MapSchema schema, schema_for(std::move(look), options, arena,
                                                      parent.empty() ? "." : parent.string(), warnings));

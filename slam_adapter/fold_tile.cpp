@@ -186,6 +186,10 @@ Result<PendingCoding> pending_coding(const MapSchema& schema, Effort effort) {
   return p;
 }
 
+Result<EncodedTile> encode_for_good(const PointCloud& tile, const MapSchema& schema) {
+  return encode_for_good(tile, schema, false);
+}
+
 Result<std::optional<Fold>> fold_tile(const std::vector<Bytes>& segments, const MapSchema& schema,
                                       const TileErrors& errors, const Box& bounds) {
   const Bytes joined = join_segments(segments);

@@ -20,6 +20,10 @@ struct PendingCoding {
 /// Errors: Unsupported (a map by the paper's method).
 [[nodiscard]] Result<PendingCoding> pending_coding(const MapSchema& schema, Effort effort);
 
+/// Codes a tile once, with the whole promise: the cheapest coding that keeps it. Pure.
+/// @param tile  with all channels of the schema. Errors: those of encode_tile; PromiseBroken.
+[[nodiscard]] Result<EncodedTile> encode_for_good(const PointCloud& tile, const MapSchema& schema);
+
 /// A tile's content after folding.
 struct Fold {
   std::uint8_t codec = 0;  ///< first byte of `bytes`

@@ -33,6 +33,7 @@ struct TileWork {
   PointCloud points;                     ///< that came in
   std::shared_ptr<StoredPoints> stored;  ///< known already, or made here
   std::vector<Bytes> segments;           ///< where it is not known
+  bool begins = false;                   ///< the tile had nothing before
   double allowed_rms_m = 0;              ///< that points may have to what stands for them
   Novelty novelty;
   std::optional<EncodedTile> coded;  ///< of what is new
@@ -219,6 +220,7 @@ Result<TileWork> MapUpdater::State::prepare(const Place& place, PointCloud point
   w.place = place;
   w.points = std::move(points);
   const TileRecord* record = writer.find(place.key, place.submap);
+  w.begins = record == nullptr;
   w.allowed_rms_m = schema.promise_value;
   if (!settings.density_cap || record == nullptr) return w;
   // A tile may have more than the map on the whole, and then its own points coming again are no news.
@@ -257,6 +259,10 @@ Status MapUpdater::State::work_on(TileWork& w) const {
   if (w.novelty.added.empty()) return {};
   const bool all = w.novelty.added.size() == w.points.size();
   const PointCloud some = all ? PointCloud{} : w.points.gather(w.novelty.added);
+  if (settings.for_good && w.begins) {
+    MAPCODEC_ASSIGN(w.coded, encode_for_good(w.points, schema));
+    return {};
+  }
   MAPCODEC_ASSIGN(EncodedTile t, encode_tile(all ? w.points : some, coding.schema, coding.tiles));
   if (w.stored != nullptr) {
     MAPCODEC_ASSIGN(const PointCloud decoded, decode_tile(t.bytes, schema));
@@ -472,6 +478,23 @@ Status MapUpdater::set_poses(std::span<const PoseChange> poses) {
   MAPCODEC_TRY(state_->writer.set_poses(poses));
   state_->changed = state_->changed || !poses.empty();
   return {};
+}
+
+Status MapUpdater::set_stamps(std::uint32_t submap, double first_s, double last_s) {
+  MapInfo info = state_->writer.info();
+  if (submap >= info.submaps.size())
+    return make_error(ErrorCode::kInvalidArgument, "there is no such submap");
+  info.submaps[submap].first_stamp_s = first_s;
+  info.submaps[submap].last_stamp_s = last_s;
+  state_->changed = true;
+  return state_->writer.set_info(std::move(info));
+}
+
+Status MapUpdater::set_extra(const std::string& name, Bytes value) {
+  MapInfo info = state_->writer.info();
+  info.extras[name] = std::move(value);
+  state_->changed = true;
+  return state_->writer.set_info(std::move(info));
 }
 
 Status MapUpdater::insert(PointCloud points, std::uint32_t submap) {

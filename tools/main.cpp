@@ -50,6 +50,7 @@ int main(int argc, char** argv) {
   add_pose(app, action);
   add_merge(app, action);
   add_flatten(app, action);
+  add_rawlog(app, action);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {

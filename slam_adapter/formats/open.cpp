@@ -16,6 +16,7 @@
 #ifdef MAPCODEC_ROSBAG
 #include "slam_adapter/rosbag/bag_scans.hpp"
 #endif
+#include "slam_adapter/mrpt/log_source.hpp"
 
 namespace mapcodec {
 namespace {
@@ -23,6 +24,11 @@ namespace {
 bool is_folder(const std::string& path) {
   std::error_code ignored;
   return std::filesystem::is_directory(path, ignored);
+}
+
+/// Read by a program of its own, from a file.
+bool is_mrpt(Format format) {
+  return format == Format::rawlog || format == Format::simplemap || format == Format::mrpt_object;
 }
 
 ReaderResult open_reader(const ByteStream& stream, Format format) {
@@ -53,6 +59,9 @@ ReaderResult open_reader(const ByteStream& stream, Format format) {
       break;
   }
   const FormatInfo& info = format_info(format);
+  if (is_mrpt(format))
+    return make_error(ErrorCode::kUnsupported,
+                      std::string("is an ") + info.name + ": give its path, not its bytes");
   const std::string what = format == Format::unknown
                                ? "is not recognised: "
                                : std::string("is ") + info.name + ", which is not supported yet: ";
@@ -88,6 +97,7 @@ Result<std::unique_ptr<PointSource>> open_source(const std::string& path, const 
   if (is_autoware_folder(path)) return open_autoware_folder(path, options);
   auto stream = file_stream(path);
   if (!stream.ok()) return named(path, stream.error());
+  if (is_mrpt(recognise(**stream, path))) return open_log(path, options);
   return open_stream(std::move(stream).value(), path, options);
 }
 

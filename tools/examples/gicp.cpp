@@ -21,12 +21,12 @@ Cloud::Ptr cloud_of(const std::vector<Vec3>& points, const Vec3& origin) {
   return r;
 }
 
-Result<Registration> run(const std::vector<Vec3>& scan, const LocalMapView& map,
+Result<Registration> run(const std::vector<Vec3>& scan, const std::vector<Vec3>& points,
                          const Eigen::Isometry3d& guess, const RegistrationSettings& settings) {
   const std::vector<Vec3> thin = thinned(scan, settings.scan_voxel_m);
   const Eigen::Vector3d at = guess.translation();
   const Cloud::Ptr source = cloud_of(thin, {0, 0, 0});
-  const Cloud::Ptr target = cloud_of(map.cloud().xyz, {at[0], at[1], at[2]});
+  const Cloud::Ptr target = cloud_of(points, {at[0], at[1], at[2]});
   if (source->size() < 20 || target->size() < 20)
     return make_error(ErrorCode::kEmpty, "too few points in the scan or around it");
   pcl::GeneralizedIterativeClosestPoint<pcl::PointXYZ, pcl::PointXYZ> gicp;
@@ -62,10 +62,10 @@ bool has_gicp() {
   return true;
 }
 
-Result<Registration> register_gicp(const std::vector<Vec3>& scan, const LocalMapView& map,
+Result<Registration> register_gicp(const std::vector<Vec3>& scan, const std::vector<Vec3>& target,
                                    const Eigen::Isometry3d& guess, const RegistrationSettings& settings) {
   try {
-    return run(scan, map, guess, settings);
+    return run(scan, target, guess, settings);
   } catch (const std::exception& e) {
     return make_error(ErrorCode::kInvalidArgument, std::string("GICP: ") + e.what());
   }
@@ -77,11 +77,16 @@ bool has_gicp() {
   return false;
 }
 
-Result<Registration> register_gicp(const std::vector<Vec3>&, const LocalMapView&, const Eigen::Isometry3d&,
-                                   const RegistrationSettings&) {
+Result<Registration> register_gicp(const std::vector<Vec3>&, const std::vector<Vec3>&,
+                                   const Eigen::Isometry3d&, const RegistrationSettings&) {
   return make_error(ErrorCode::kUnsupported, "built without PCL's registration library");
 }
 
 #endif
+
+Result<Registration> register_gicp(const std::vector<Vec3>& scan, const LocalMapView& map,
+                                   const Eigen::Isometry3d& guess, const RegistrationSettings& settings) {
+  return register_gicp(scan, map.cloud().xyz, guess, settings);
+}
 
 }  // namespace mapcodec::examples

@@ -194,6 +194,14 @@ std::vector<Vec3> thinned(const std::vector<Vec3>& points, double voxel_m) {
   return r;
 }
 
+Eigen::Isometry3d to_isometry(const MapPose& p) {
+  const auto& [x, y, z, w] = p.rotation_xyzw;
+  Eigen::Isometry3d t = Eigen::Isometry3d::Identity();
+  t.translate(eigen(p.translation_m));
+  t.rotate(Eigen::Quaterniond(w, x, y, z).normalized());
+  return t;
+}
+
 MapPose to_pose(const Eigen::Isometry3d& t) {
   const Eigen::Quaterniond q = Eigen::Quaterniond(t.linear()).normalized();
   return {plain(t.translation()), {q.x(), q.y(), q.z(), q.w()}};

@@ -47,12 +47,18 @@ enum class Partner {
 [[nodiscard]] Result<Registration> register_gicp(const std::vector<Vec3>& scan, const LocalMapView& map,
                                                  const Eigen::Isometry3d& guess,
                                                  const RegistrationSettings& settings = {});
+/// The same against points of any origin [m, map frame].
+[[nodiscard]] Result<Registration> register_gicp(const std::vector<Vec3>& scan,
+                                                 const std::vector<Vec3>& target,
+                                                 const Eigen::Isometry3d& guess,
+                                                 const RegistrationSettings& settings = {});
 /// Whether register_gicp was built.
 [[nodiscard]] bool has_gicp();
 
 /// The mean of the points in each voxel, in the order in which voxels were first met.
 [[nodiscard]] std::vector<Vec3> thinned(const std::vector<Vec3>& points, double voxel_m);
 
+[[nodiscard]] Eigen::Isometry3d to_isometry(const MapPose& p);
 [[nodiscard]] MapPose to_pose(const Eigen::Isometry3d& t);
 /// [mm] between the origins, [mrad] of the rotation between them.
 struct PoseDifference {

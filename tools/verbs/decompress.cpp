@@ -7,6 +7,7 @@
 #include <memory>
 
 #include "slam_adapter/autoware/autoware_folder.hpp"
+#include "slam_adapter/mrpt/simplemap_file.hpp"
 #include "slam_adapter/planes_file.hpp"
 #include "tools/verbs/report.hpp"
 #include "tools/verbs/verbs.hpp"
@@ -86,7 +87,9 @@ int fail_decompress(const Arguments& a, const Error& error) {
 }
 
 int write_points(const Arguments& a, const Region& region, const ReadSettings& settings) {
-  const auto r = decompress(a.map, a.output, region, a.revision, settings, a.write);
+  const auto r = is_simplemap_name(a.output)
+                     ? decompress_simplemap(a.map, a.output, a.revision, settings)
+                     : decompress(a.map, a.output, region, a.revision, settings, a.write);
   if (!r.ok()) return fail_decompress(a, r.error());
   if (a.json) {
     fmt::print("{}\n", report_json(*r).dump(2));
@@ -142,7 +145,10 @@ std::string contradiction(const Arguments& a) {
   if (a.as != "planes" && a.surfaces.cylinders) return "--cylinders is for --as planes";
   if (a.as != "points" && a.as != "autoware" && a.write.compressed)
     return "--binary-compressed is for --as points or autoware";
-  if ((a.as == "points" || a.as == "autoware") && a.surfaces.tolerance_m > 0) return "--tolerance is for --as planes or mesh";
+  if ((a.as == "points" || a.as == "autoware") && a.surfaces.tolerance_m > 0)
+    return "--tolerance is for --as planes or mesh";
+  if (is_simplemap_name(a.output) && (a.as != "points" || a.level || !a.box.empty() || !a.sphere.empty()))
+    return "a simplemap holds whole keyframes of points: without --as, --level, --box, --sphere";
   return {};
 }
 
@@ -178,8 +184,10 @@ void add_decompress(CLI::App& app, Action& action) {
   auto a = std::make_shared<Arguments>();
   CLI::App* verb = app.add_subcommand("decompress", "An archive in; points, planes or a mesh out");
   verb->add_option("MAP", a->map, "The archive")->required();
-  verb->add_option("-o,--output", a->output,
-                   "File to write: .pcd .ply .las .xyz .txt .pts .bin .vtk; planes: JSON; mesh: .ply; autoware: a folder")
+  verb->add_option(
+          "-o,--output", a->output,
+          "File to write: .pcd .ply .las .xyz .txt .pts .bin .vtk .simplemap (MRPT, a keyframe per submap); "
+          "planes: JSON; mesh: .ply; autoware: a folder")
       ->required();
   auto* box = verb->add_option("--box", a->box, "Only points in x0,y0,z0,x1,y1,z1 [m]");
   verb->add_option("--sphere", a->sphere, "Only points in x,y,z,r [m]")->excludes(box);

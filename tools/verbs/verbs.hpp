@@ -29,5 +29,6 @@ void add_crop(CLI::App& app, Action& action);
 void add_pose(CLI::App& app, Action& action);
 void add_flatten(CLI::App& app, Action& action);
 void add_merge(CLI::App& app, Action& action);
+void add_rawlog(CLI::App& app, Action& action);
 
 }  // namespace mapcodec::cli
