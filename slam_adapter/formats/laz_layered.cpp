@@ -207,9 +207,9 @@ class Point14 final : public Item {
   std::size_t channel_ = 0;
 };
 
-/// What items other than the point share: a context for each channel of the scanner, begun from the last value
-/// of the channel before. Version 3 has a slip that its files keep: after a change to a channel that was known
-/// already, one value is predicted from, and remembered in, the channel before.
+/// What items other than the point share: a context for each channel of the scanner, begun from the last
+/// value of the channel before. Version 3 has a slip that its files keep: after a change to a channel that
+/// was known already, one value is predicted from, and remembered in, the channel before.
 template <class Context>
 class ByChannel {
  public:
@@ -331,14 +331,16 @@ class LayeredChunk final : public LazChunk {
     points_ = bytes.u32();
     std::vector<std::uint64_t> sizes(layers);
     for (std::uint64_t& s : sizes) s = bytes.u32();
-    if (bytes.failed()) return make_error(ErrorCode::kTruncated, "ends within the sizes of a chunk's layers", begin);
+    if (bytes.failed())
+      return make_error(ErrorCode::kTruncated, "ends within the sizes of a chunk's layers", begin);
     std::uint64_t at = bytes.offset();
     std::size_t layer = 0, offset = 0, channel = 0;
     for (const LazItem& item : items) {
       std::vector<Layer> mine(layers_of(item));
       for (Layer& l : mine) {
         const std::uint64_t size = sizes[layer++];
-        if (size > end - at) return make_error(ErrorCode::kTruncated, "has a layer that ends beyond its chunk", at);
+        if (size > end - at)
+          return make_error(ErrorCode::kTruncated, "has a layer that ends beyond its chunk", at);
         l.present = size > 0;
         if (l.present) l.decoder.begin(LazBytes(stream, at, at + size));
         at += size;

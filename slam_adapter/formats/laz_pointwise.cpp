@@ -45,8 +45,8 @@ class Point10 final : public Item {
  private:
   void attributes(LazDecoder& from, std::uint32_t changed, std::size_t map) {
     if (changed & 16) {
-      intensity_[map] = static_cast<std::uint16_t>(
-          intensities_.next(from, intensity_[map], std::min<std::size_t>(map, 3)));
+      intensity_[map] =
+          static_cast<std::uint16_t>(intensities_.next(from, intensity_[map], std::min<std::size_t>(map, 3)));
     }
     laz_store(&last_[12], intensity_[map]);
     if (changed & 8) last_[15] = static_cast<std::uint8_t>(from.symbol(classes_[last_[15]]));
@@ -176,7 +176,8 @@ Result<std::unique_ptr<LazChunk>> open_pointwise_chunk(const std::vector<LazItem
   LazBytes bytes(stream, begin, end);
   Bytes first(total);
   bytes.raw(first.data(), total);
-  if (bytes.failed()) return make_error(ErrorCode::kTruncated, "ends within the first point of a chunk", begin);
+  if (bytes.failed())
+    return make_error(ErrorCode::kTruncated, "ends within the first point of a chunk", begin);
   std::vector<std::unique_ptr<Item>> coders;
   for (std::size_t i = 0, at = 0; i < items.size(); at += sizes[i++]) {
     MAPCODEC_ASSIGN(std::unique_ptr<Item> coder, make_item(items[i], first.data() + at));

@@ -95,13 +95,12 @@ class Scans final : public BagScans {
       return make_error(ErrorCode::kEmpty,
                         std::string("holds no ") + kCloudType + "; it has " + list_topics(bag_, ""));
     for (const std::string& topic : options.topics) {
-      const bool there = std::any_of(clouds_.begin(), clouds_.end(), [&](std::uint32_t c) {
-        return bag_.connections.at(c).topic == topic;
-      });
+      const bool there = std::any_of(clouds_.begin(), clouds_.end(),
+                                     [&](std::uint32_t c) { return bag_.connections.at(c).topic == topic; });
       if (!there)
-        return make_error(ErrorCode::kInvalidArgument, "has no clouds on the topic " + topic +
-                                                           "; it has them on " +
-                                                           list_topics(bag_, kCloudType));
+        return make_error(
+            ErrorCode::kInvalidArgument,
+            "has no clouds on the topic " + topic + "; it has them on " + list_topics(bag_, kCloudType));
     }
     if (options.topics.empty()) return {};
     std::erase_if(clouds_, [&](std::uint32_t c) {
@@ -137,8 +136,9 @@ class Scans final : public BagScans {
       MAPCODEC_ASSIGN(poses_, BagPoses::read(bag_, *stream_, options, options.poses));
       MAPCODEC_ASSIGN(const bool any, any_pose());
       if (any) return {};
-      return make_error(ErrorCode::kEmpty,
-                        "holds no cloud whose pose is known at its time; --poses none takes them as they lie");
+      return make_error(
+          ErrorCode::kEmpty,
+          "holds no cloud whose pose is known at its time; --poses none takes them as they lie");
     }
     for (const Poses p : {Poses::tf, Poses::odometry}) {
       if (!mapcodec::has_poses(bag_, p)) continue;
@@ -148,10 +148,11 @@ class Scans final : public BagScans {
     }
     poses_.reset();
     if (!options.frame.empty())
-      return make_error(ErrorCode::kEmpty, "holds no cloud whose pose in the frame " + options.frame +
-                                               " is known at its time");
+      return make_error(ErrorCode::kEmpty,
+                        "holds no cloud whose pose in the frame " + options.frame + " is known at its time");
     warnings_.emplace_back(
-        "neither tf nor odometry knows the sensor's pose: all clouds are taken as they lie, in their own frames");
+        "neither tf nor odometry knows the sensor's pose: all clouds are taken as they lie, in their own "
+        "frames");
     return {};
   }
 

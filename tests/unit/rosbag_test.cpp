@@ -62,7 +62,8 @@ TEST(RosBag, OdometryFramesAndNone) {
   const ReadBack base = read_bag(bag, poses(BagOptions::Poses::tf, "base_link"));
   ASSERT_EQ(base.cloud.size(), 14u);
   expect_near(base.cloud.xyz[4], {0, 1, 1});
-  EXPECT_TRUE(fails_with(read_bag(bag, poses(BagOptions::Poses::tf, "moon")), ErrorCode::kEmpty, "--poses none"));
+  EXPECT_TRUE(
+      fails_with(read_bag(bag, poses(BagOptions::Poses::tf, "moon")), ErrorCode::kEmpty, "--poses none"));
 }
 
 TEST(RosBag, WithoutIndexTheChunksTell) {
@@ -74,7 +75,8 @@ TEST(RosBag, WithoutIndexTheChunksTell) {
 
 TEST(RosBag, ScansOneByOneAndAgain) {
   const std::string bytes = driving_bag("lz4");
-  auto scans = BagScans::open(memory_stream(ByteSpan(reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size())), {});
+  auto scans = BagScans::open(
+      memory_stream(ByteSpan(reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size())), {});
   ASSERT_TRUE(scans.ok());
   for (int round = 0; round < 2; ++round) {
     BagScan scan;
@@ -96,8 +98,8 @@ TEST(RosBag, ScansOneByOneAndAgain) {
 TEST(RosBag, EveryTypeEveryEndPaddingAndColour) {
   for (const bool big : {false, true}) {
     Cloud c;
-    c.fields = {{"x", 0, 8},   {"y", 8, 3},    {"z", 12, 7},  {"rgb", 16, 7}, {"ring", 20, 4},
-                {"t", 24, 6},  {"hist", 28, 2, 3}, {"i8", 31, 1}, {"i32", 32, 5}};
+    c.fields = {{"x", 0, 8},  {"y", 8, 3},        {"z", 12, 7},  {"rgb", 16, 7}, {"ring", 20, 4},
+                {"t", 24, 6}, {"hist", 28, 2, 3}, {"i8", 31, 1}, {"i32", 32, 5}};
     c.point_step = 40;
     c.width = 2;
     c.height = 2;
@@ -175,10 +177,13 @@ TEST(RosBag, BadMessagesAndBags) {
     return read_bag(one_cloud(c));
   };
   EXPECT_TRUE(fails_with(bad([](Cloud& c) { c.width = 3; }), ErrorCode::kMalformed, "announces 3 points"));
-  EXPECT_TRUE(fails_with(bad([](Cloud& c) { c.fields[2].offset = 9; }), ErrorCode::kMalformed, "beyond the end"));
-  EXPECT_TRUE(fails_with(bad([](Cloud& c) { c.fields[2].datatype = 9; }), ErrorCode::kMalformed, "unknown type 9"));
+  EXPECT_TRUE(
+      fails_with(bad([](Cloud& c) { c.fields[2].offset = 9; }), ErrorCode::kMalformed, "beyond the end"));
+  EXPECT_TRUE(
+      fails_with(bad([](Cloud& c) { c.fields[2].datatype = 9; }), ErrorCode::kMalformed, "unknown type 9"));
   EXPECT_TRUE(fails_with(bad([](Cloud& c) { c.fields.pop_back(); }), ErrorCode::kMalformed, "no field z"));
-  EXPECT_TRUE(fails_with(bad([](Cloud& c) { c.fields[2].count = 0x40000000; }), ErrorCode::kMalformed, "beyond"));
+  EXPECT_TRUE(
+      fails_with(bad([](Cloud& c) { c.fields[2].count = 0x40000000; }), ErrorCode::kMalformed, "beyond"));
   BagWriter empty;
   EXPECT_TRUE(fails_with(read_bag(empty.finish()), ErrorCode::kEmpty, "no message"));
   BagWriter other;
@@ -225,7 +230,8 @@ TEST(FrameTree, InterpolatesTurnsBothWaysRound) {
   ASSERT_TRUE(half);
   expect_near(half->apply({1, 0, 0}), {std::cos(0.5), std::sin(0.5), 0});
   expect_near(tree.lookup("station", "base", 0)->apply({0, 0, 0}), {-5, 0, 0});
-  expect_near(tree.lookup("base", "station", 1000)->apply({0, 0, 0}), {5 * std::cos(1.0), -5 * std::sin(1.0), 0});
+  expect_near(tree.lookup("base", "station", 1000)->apply({0, 0, 0}),
+              {5 * std::cos(1.0), -5 * std::sin(1.0), 0});
   EXPECT_FALSE(tree.lookup("map", "base", 200'000'000));
   EXPECT_FALSE(tree.lookup("map", "unknown", 0));
 }

@@ -142,7 +142,8 @@ std::string contradiction(const Arguments& a) {
   if (a.as != "planes" && a.surfaces.cylinders) return "--cylinders is for --as planes";
   if (a.as != "points" && a.as != "autoware" && a.write.compressed)
     return "--binary-compressed is for --as points or autoware";
-  if ((a.as == "points" || a.as == "autoware") && a.surfaces.tolerance_m > 0) return "--tolerance is for --as planes or mesh";
+  if ((a.as == "points" || a.as == "autoware") && a.surfaces.tolerance_m > 0)
+    return "--tolerance is for --as planes or mesh";
   return {};
 }
 
@@ -179,7 +180,8 @@ void add_decompress(CLI::App& app, Action& action) {
   CLI::App* verb = app.add_subcommand("decompress", "An archive in; points, planes or a mesh out");
   verb->add_option("MAP", a->map, "The archive")->required();
   verb->add_option("-o,--output", a->output,
-                   "File to write: .pcd .ply .las .xyz .txt .pts .bin .vtk; planes: JSON; mesh: .ply; autoware: a folder")
+                   "File to write: .pcd .ply .las .xyz .txt .pts .bin .vtk; planes: JSON; mesh: .ply; "
+                   "autoware: a folder")
       ->required();
   auto* box = verb->add_option("--box", a->box, "Only points in x0,y0,z0,x1,y1,z1 [m]");
   verb->add_option("--sphere", a->sphere, "Only points in x,y,z,r [m]")->excludes(box);
