@@ -3,7 +3,10 @@
 
 #include <chrono>
 #include <cmath>
+#include <cstdio>
 #include <filesystem>
+#include <functional>
+#include <limits>
 #include <map>
 
 #include "maps/submap_pose.hpp"

@@ -213,8 +213,8 @@ class Point14 final : public Item {
 template <class Context>
 class ByChannel {
  public:
-  ByChannel(std::size_t channel, const Context& first, bool slips) : at_(channel), slips_(slips) {
-    contexts_[channel].emplace(first);
+  ByChannel(std::size_t channel, Context first, bool slips) : at_(channel), slips_(slips) {
+    contexts_[channel].emplace(std::move(first));
   }
   /// @param last  out: whose last value counts.
   Context& choose(std::size_t channel, Context*& last) {
@@ -283,9 +283,7 @@ class Rgb14 final : public Item {
 class Bytes14 final : public Item {
  public:
   Bytes14(std::vector<Layer> layers, const std::uint8_t* first, std::size_t channel, bool slips)
-      : Item(std::move(layers)),
-        contexts_(channel, {Bytes(first, first + layers_.size()), std::vector<LazSymbols>(layers_.size())},
-                  slips) {}
+      : Item(std::move(layers)), contexts_(channel, Context(Bytes(first, first + layers_.size())), slips) {}
 
   void next(std::uint8_t* item, std::size_t& channel) override {
     Context* last = nullptr;
@@ -299,9 +297,10 @@ class Bytes14 final : public Item {
 
  private:
   struct Context {
+    explicit Context(Bytes v) : values(std::move(v)), models(values.size(), 256) {}
     Bytes values;
-    std::vector<LazSymbols> models;
-    [[nodiscard]] Context fresh() const { return {values, std::vector<LazSymbols>(values.size())}; }
+    LazModels models;
+    [[nodiscard]] Context fresh() const { return Context(values); }
   };
   ByChannel<Context> contexts_;
 };

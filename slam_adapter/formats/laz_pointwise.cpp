@@ -107,7 +107,7 @@ class Rgb final : public Item {
 
 class RawBytes final : public Item {
  public:
-  RawBytes(const std::uint8_t* first, std::size_t size) : last_(first, first + size), models_(size) {}
+  RawBytes(const std::uint8_t* first, std::size_t size) : last_(first, first + size), models_(size, 256) {}
   void next(LazDecoder& from, std::uint8_t* item) override {
     for (std::size_t i = 0; i < last_.size(); ++i)
       item[i] = last_[i] = static_cast<std::uint8_t>(last_[i] + from.symbol(models_[i]));
@@ -115,7 +115,7 @@ class RawBytes final : public Item {
 
  private:
   Bytes last_;
-  std::vector<LazSymbols> models_;
+  LazModels models_;
 };
 
 Result<std::unique_ptr<Item>> make_item(const LazItem& item, const std::uint8_t* first) {

@@ -2,6 +2,7 @@
 #include "slam_adapter/rosbag/bag_scans.hpp"
 
 #include <algorithm>
+#include <map>
 
 #include "slam_adapter/formats/record_source.hpp"
 #include "slam_adapter/rosbag/bag_poses.hpp"
@@ -112,20 +113,23 @@ class Scans final : public BagScans {
 
   /// The first message of each connection tells its layout.
   Status find_layout() {
+    std::map<std::uint32_t, PointCloud> found;
+    BagMessages messages(bag_, *stream_, clouds_);
+    BagMessage m;
+    while (found.size() < clouds_.size()) {
+      MAPCODEC_ASSIGN(const bool more, messages.next(m));
+      if (!more) break;
+      if (found.count(m.connection) > 0) continue;
+      MAPCODEC_ASSIGN(const RosCloud cloud, read_cloud(m.bytes));
+      MAPCODEC_ASSIGN(found[m.connection], cloud_layout(cloud));
+    }
+    if (found.empty()) return make_error(ErrorCode::kEmpty, std::string("holds no message of ") + kCloudType);
     std::vector<PointCloud> layouts;
     std::vector<std::string> names;
-    for (const std::uint32_t c : clouds_) {
-      BagMessages messages(bag_, *stream_, {c});
-      BagMessage m;
-      MAPCODEC_ASSIGN(const bool any, messages.next(m));
-      if (!any) continue;
-      MAPCODEC_ASSIGN(const RosCloud cloud, read_cloud(m.bytes));
-      MAPCODEC_ASSIGN(PointCloud layout, cloud_layout(cloud));
+    for (auto& [number, layout] : found) {
       layouts.push_back(std::move(layout));
-      names.push_back(bag_.connections.at(c).topic);
+      names.push_back(bag_.connections.at(number).topic);
     }
-    if (layouts.empty())
-      return make_error(ErrorCode::kEmpty, std::string("holds no message of ") + kCloudType);
     layout_ = common_layout(layouts, names, warnings_);
     return {};
   }
