@@ -35,6 +35,13 @@ std::int64_t stamp_of(const RosHeader& header, std::int64_t recorded_ns) {
   return header.stamp_ns != 0 ? header.stamp_ns : recorded_ns;
 }
 
+/// The error of a message, with the place of its chunk.
+template <class T>
+Result<T> in_chunk(Result<T> result, const BagMessages& messages) {
+  if (result.ok() || result.error().offset) return result;
+  return make_error(result.error().code, result.error().message, messages.chunk_offset());
+}
+
 class Scans final : public BagScans {
  public:
   Scans(std::unique_ptr<ByteStream> stream, BagFile bag) : stream_(std::move(stream)), bag_(std::move(bag)) {}
@@ -55,7 +62,7 @@ class Scans final : public BagScans {
     for (;;) {
       MAPCODEC_ASSIGN(const bool more, messages_->next(m));
       if (!more) return false;
-      MAPCODEC_ASSIGN(const RosCloud cloud, read_cloud(m.bytes));
+      MAPCODEC_ASSIGN(const RosCloud cloud, in_chunk(read_cloud(m.bytes), *messages_));
       ++seen_;
       scan.topic = bag_.connections.at(m.connection).topic;
       scan.frame = cloud.header.frame;
@@ -65,7 +72,7 @@ class Scans final : public BagScans {
         ++without_pose_;
         continue;
       }
-      MAPCODEC_ASSIGN(scan.points, decode_cloud(cloud));
+      MAPCODEC_ASSIGN(scan.points, in_chunk(decode_cloud(cloud), *messages_));
       if (conform(scan.points, layout_)) return true;
       ++without_layout_;
     }
@@ -120,8 +127,8 @@ class Scans final : public BagScans {
       MAPCODEC_ASSIGN(const bool more, messages.next(m));
       if (!more) break;
       if (found.count(m.connection) > 0) continue;
-      MAPCODEC_ASSIGN(const RosCloud cloud, read_cloud(m.bytes));
-      MAPCODEC_ASSIGN(found[m.connection], cloud_layout(cloud));
+      MAPCODEC_ASSIGN(const RosCloud cloud, in_chunk(read_cloud(m.bytes), messages));
+      MAPCODEC_ASSIGN(found[m.connection], in_chunk(cloud_layout(cloud), messages));
     }
     if (found.empty()) return make_error(ErrorCode::kEmpty, std::string("holds no message of ") + kCloudType);
     std::vector<PointCloud> layouts;
@@ -166,7 +173,7 @@ class Scans final : public BagScans {
     for (;;) {
       MAPCODEC_ASSIGN(const bool more, messages.next(m));
       if (!more) return false;
-      MAPCODEC_ASSIGN(const RosCloud cloud, read_cloud(m.bytes));
+      MAPCODEC_ASSIGN(const RosCloud cloud, in_chunk(read_cloud(m.bytes), messages));
       if (poses_->at(cloud.header.frame, stamp_of(cloud.header, m.time_ns))) return true;
     }
   }

@@ -66,6 +66,21 @@ TEST(RosBag, OdometryFramesAndNone) {
       fails_with(read_bag(bag, poses(BagOptions::Poses::tf, "moon")), ErrorCode::kEmpty, "--poses none"));
 }
 
+TEST(RosBag, PosesThatAreNoneAreLeftOutAndCounted) {
+  BagWriter bag;
+  const Transform good{"odom", "lidar", 1000, {{5, 0, 0}, {0, 0, 0, 1}}};
+  Transform bad = good;
+  bad.pose.rotation_xyzw = {0, 0, 0, 0};
+  bag.add_chunk({tf({good, bad}), odometry(bad), odometry(good), cloud(xyz_cloud({{1, 2, 3}}, 1000))});
+  for (const auto p : {BagOptions::Poses::tf, BagOptions::Poses::odometry}) {
+    const ReadBack r = read_bag(bag.finish(), poses(p));
+    ASSERT_EQ(r.cloud.size(), 1u) << message(r);
+    expect_near(r.cloud.xyz[0], {6, 2, 3});
+    ASSERT_FALSE(r.warnings.empty());
+    EXPECT_NE(r.warnings.front().find("left out"), std::string::npos) << r.warnings.front();
+  }
+}
+
 TEST(RosBag, WithoutIndexTheChunksTell) {
   const ReadBack r = read_bag(driving_bag("lz4", false));
   ASSERT_EQ(r.cloud.size(), 14u) << message(r);
