@@ -97,6 +97,8 @@ Result<MapUpdater> open_or_create(const std::string& map_path, const UpdateReque
   read.keep_nonfinite = r.create->promise == PromiseKind::lossless;
   read.unit_m = r.unit_m;
   read.bag = r.bag;
+  // Submaps hold scans as the sensor saw them.
+  if (r.each_scan) read.bag.poses = BagOptions::Poses::none;
   MAPCODEC_ASSIGN(const std::unique_ptr<PointSource> first, open_source(r.inputs.front(), read));
   auto map = create_map(map_path, *first, *r.create, arena, r.settings, warnings);
   if (!map.ok() && map.error().code != ErrorCode::kCannotWrite) return named(r.inputs.front(), map.error());

@@ -146,8 +146,9 @@ Result<VerifyOutcome> verify_map_against(const std::string& path, const std::vec
                                          const ReadSettings& settings, const BagOptions& bag) {
   MAPCODEC_ASSIGN(VerifyOutcome v, verify_map(path, settings));
   MAPCODEC_ASSIGN(const MapFile map, MapFile::open(path));
-  MAPCODEC_TRY(map.schema().promise == PromiseKind::lossless ? check_lossless(map, originals, bag, settings, v)
-                                                             : check_lossy(map, originals, bag, settings, v));
+  MAPCODEC_TRY(map.schema().promise == PromiseKind::lossless
+                   ? check_lossless(map, originals, bag, settings, v)
+                   : check_lossy(map, originals, bag, settings, v));
   return v;
 }
 

@@ -9,7 +9,8 @@ packages=(
   libcgal-dev libgmp-dev libmpfr-dev libpcl-dev                             # the 2014 paper's encoder, test oracles
   libcli11-dev libspdlog-dev nlohmann-json3-dev libpng-dev                  # the programs
   libdraco-dev gnuplot-nox zstd xz-utils                                    # what the benchmarks compare with and draw
-  libgtest-dev python3                                                      # tests
+  liblz4-dev libbz2-dev libpugixml-dev libyaml-cpp-dev                      # ROS bags, E57, Autoware's metadata
+  libgtest-dev python3 librosbag-storage-dev                                # tests
 )
 [[ "${1:-}" == fuzz ]] && packages+=(clang-14 libclang-rt-14-dev)
 

@@ -3,7 +3,10 @@
 
 #include <chrono>
 #include <cmath>
+#include <cstdio>
 #include <filesystem>
+#include <functional>
+#include <limits>
 #include <map>
 
 #include "maps/submap_pose.hpp"
@@ -26,7 +29,8 @@ struct Cells {
 /// Written under another name until it is complete.
 class NewFolder {
  public:
-  explicit NewFolder(const std::string& path) : path_(path), temporary_(path + ".tmp" + std::to_string(::getpid())) {}
+  explicit NewFolder(const std::string& path)
+      : path_(path), temporary_(path + ".tmp" + std::to_string(::getpid())) {}
   NewFolder(const NewFolder&) = delete;
   NewFolder& operator=(const NewFolder&) = delete;
   ~NewFolder() {
@@ -37,7 +41,8 @@ class NewFolder {
     std::error_code failed;
     if (fs::exists(path_, failed)) {
       if (!overwrite) return cannot("exists already (--force replaces it)");
-      if (!is_autoware_folder(path_)) return cannot("exists already and is no Autoware map, so it is not replaced");
+      if (!is_autoware_folder(path_))
+        return cannot("exists already and is no Autoware map, so it is not replaced");
       replaces_ = true;
     }
     fs::create_directories(fs::path(temporary_) / kAutowareTileFolder, failed);
@@ -56,7 +61,9 @@ class NewFolder {
   [[nodiscard]] std::string tile(const std::string& file) const {
     return (fs::path(temporary_) / kAutowareTileFolder / file).string();
   }
-  [[nodiscard]] std::string metadata() const { return (fs::path(temporary_) / kAutowareMetadataFile).string(); }
+  [[nodiscard]] std::string metadata() const {
+    return (fs::path(temporary_) / kAutowareMetadataFile).string();
+  }
 
  private:
   [[nodiscard]] Error cannot(const std::string& what) const {
@@ -68,8 +75,8 @@ class NewFolder {
 
 class Exporter {
  public:
-  Exporter(const MapFile& map, const Region& region, const ReadSettings& settings, const AutowareExport& options,
-           NewFolder& folder, AutowareReport& report)
+  Exporter(const MapFile& map, const Region& region, const ReadSettings& settings,
+           const AutowareExport& options, NewFolder& folder, AutowareReport& report)
       : map_(map), region_(region), settings_(settings), options_(options), folder_(folder), report_(report) {
     layout_ = map.layout(settings).like();
     layout_.coordinates = {};
@@ -128,7 +135,8 @@ class Exporter {
     std::uint64_t points = 0;
     for (const std::size_t i : map_.tiles_in(region)) points += map_.archive().tiles()[i].points;
     if (points == 0) return {};
-    const std::int64_t width = cells.max.first - cells.min.first, height = cells.max.second - cells.min.second;
+    const std::int64_t width = cells.max.first - cells.min.first,
+                       height = cells.max.second - cells.min.second;
     if (points <= kAtOnce) return write_at_once(cells, region);
     if (width == 1 && height == 1) return write_large(cells.min, region);
     Cells low = cells, high = cells;
@@ -184,9 +192,8 @@ class Exporter {
     }));
     if (count == 0) return {};
     MAPCODEC_ASSIGN(const std::unique_ptr<PointSink> sink, begin_tile(cell, count));
-    MAPCODEC_TRY(map_.read(region, settings_, [&](PointCloud&& cloud) {
-      return write_part(cells, std::move(cloud), *sink);
-    }));
+    MAPCODEC_TRY(map_.read(region, settings_,
+                           [&](PointCloud&& cloud) { return write_part(cells, std::move(cloud), *sink); }));
     return sink->finish();
   }
 
@@ -223,8 +230,8 @@ class Exporter {
     if (step > 1e-3) {
       char text[160];
       std::snprintf(text, sizeof(text),
-                    "coordinates reach %.0f: the float32 of Autoware's tiles keeps them within %.2g m only", largest_,
-                    step / 2);
+                    "coordinates reach %.0f: the float32 of Autoware's tiles keeps them within %.2g m only",
+                    largest_, step / 2);
       report_.warnings.emplace_back(text);
     }
     for (std::string& w : unwritten_channels("tile.pcd", layout_)) report_.warnings.push_back(std::move(w));
@@ -249,8 +256,9 @@ Result<AutowareReport> export_autoware(const std::string& map_path, const std::s
   const auto begin = std::chrono::steady_clock::now();
   const double size = options.tile_size_m;
   if (!(size >= 1) || size != std::floor(size) || size > 1e6)
-    return make_error(ErrorCode::kInvalidArgument,
-                      "tiles of Autoware have sides of whole metres, 1 to 1000000: its loader reads integers");
+    return make_error(
+        ErrorCode::kInvalidArgument,
+        "tiles of Autoware have sides of whole metres, 1 to 1000000: its loader reads integers");
   MAPCODEC_ASSIGN(const MapFile map, MapFile::open(map_path, revision));
   NewFolder place(folder);
   MAPCODEC_TRY(place.begin(options.overwrite));

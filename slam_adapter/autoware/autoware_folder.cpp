@@ -71,8 +71,9 @@ class TileFiles final : public NamedSource {
       if (!known_) layout_ = layout.like();
       known_ = true;
       if (!same_channels(layout_, layout))
-        return make_error(ErrorCode::kInvalidArgument,
-                          path + ": has other channels than the tiles before; tiles of one map need the same");
+        return make_error(
+            ErrorCode::kInvalidArgument,
+            path + ": has other channels than the tiles before; tiles of one map need the same");
       if (layout.coordinates != layout_.coordinates)
         layout_.coordinates = {CoordinateFormat::Kind::f64, {1, 1, 1}, {0, 0, 0}};
       announced_ += (*source)->announced_points().value_or(0);

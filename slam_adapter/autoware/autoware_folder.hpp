@@ -9,9 +9,9 @@ namespace mapcodec {
 
 /// Whether `folder` holds pointcloud_map_metadata.yaml.
 [[nodiscard]] bool is_autoware_folder(const std::string& folder);
-/// The tiles that the metadata names as one cloud, in its order; they lie beside it, in pointcloud_map.pcd/ or
-/// in pointcloud_map/. One is open at a time. Errors: those of a tile and of parse_autoware_metadata; NotFound
-/// (a tile); InvalidArgument (channels that not all have).
+/// The tiles that the metadata names as one cloud, in its order; they lie beside it, in pointcloud_map.pcd/
+/// or in pointcloud_map/. One is open at a time. Errors: those of a tile and of parse_autoware_metadata;
+/// NotFound (a tile); InvalidArgument (channels that not all have).
 [[nodiscard]] Result<std::unique_ptr<PointSource>> open_autoware_folder(const std::string& folder,
                                                                         const ReadOptions& options);
 /// Size of the tiles. Errors: as for opening.
@@ -33,7 +33,8 @@ struct AutowareReport : DecompressReport {
 /// Errors: those of MapFile; InvalidArgument (size), Empty, CannotWrite (also where something stands at
 /// `folder`).
 [[nodiscard]] Result<AutowareReport> export_autoware(const std::string& map_path, const std::string& folder,
-                                                     const Region& region, std::optional<std::uint64_t> revision,
+                                                     const Region& region,
+                                                     std::optional<std::uint64_t> revision,
                                                      const ReadSettings& settings,
                                                      const AutowareExport& options);
 

@@ -18,7 +18,8 @@ Status read_tile(const std::string& name, const YAML::Node& value, AutowareMetad
     return malformed("names the tile '" + name + "', which is no name of a file");
   if (!value.IsSequence() || value.size() != 2) return malformed("gives the tile " + name + " no [x, y]");
   AutowareMetadata::Tile tile{name, value[0].as<double>(), value[1].as<double>()};
-  if (!std::isfinite(tile.x) || !std::isfinite(tile.y)) return malformed("gives the tile " + name + " no place");
+  if (!std::isfinite(tile.x) || !std::isfinite(tile.y))
+    return malformed("gives the tile " + name + " no place");
   metadata.tiles.push_back(std::move(tile));
   return {};
 }
@@ -53,7 +54,8 @@ Result<AutowareMetadata> parse_autoware_metadata(const std::string& text) {
   try {
     return read_document(YAML::Load(text));
   } catch (const YAML::Exception& e) {
-    return malformed("is no YAML as Autoware writes it: " + e.msg + " (line " + std::to_string(e.mark.line + 1) + ")");
+    return malformed("is no YAML as Autoware writes it: " + e.msg + " (line " +
+                     std::to_string(e.mark.line + 1) + ")");
   } catch (const std::exception& e) {
     return malformed(std::string("cannot be read as YAML: ") + e.what());
   }
@@ -61,8 +63,8 @@ Result<AutowareMetadata> parse_autoware_metadata(const std::string& text) {
 
 std::string format_autoware_metadata(const AutowareMetadata& metadata) {
   const auto side = [](double v) { return number(v) + (v == std::floor(v) ? ".0" : ""); };
-  std::string r = "x_resolution: " + side(metadata.x_resolution_m) + "\ny_resolution: " +
-                  side(metadata.y_resolution_m) + "\n";
+  std::string r = "x_resolution: " + side(metadata.x_resolution_m) +
+                  "\ny_resolution: " + side(metadata.y_resolution_m) + "\n";
   for (const auto& t : metadata.tiles) r += t.file + ": [" + number(t.x) + ", " + number(t.y) + "]\n";
   return r;
 }

@@ -40,12 +40,14 @@ bool is_consumed(const std::string& field) {
   const auto in = [&](const std::vector<std::string>& names) {
     return std::find(names.begin(), names.end(), field) != names.end();
   };
-  return in(kCartesian) || in(kSpherical) || field == "cartesianInvalidState" || field == "sphericalInvalidState";
+  return in(kCartesian) || in(kSpherical) || field == "cartesianInvalidState" ||
+         field == "sphericalInvalidState";
 }
 
 template <class T>
 bool fits(std::int64_t min, std::int64_t max) {
-  return min >= std::int64_t{std::numeric_limits<T>::min()} && max <= std::int64_t{std::numeric_limits<T>::max()};
+  return min >= std::int64_t{std::numeric_limits<T>::min()} &&
+         max <= std::int64_t{std::numeric_limits<T>::max()};
 }
 
 ScalarType integer_type(std::int64_t min, std::int64_t max) {
@@ -84,7 +86,8 @@ CoordinateFormat coordinates_of(const E57Description& d) {
   for (std::size_t i = 0; i < 3; ++i) {
     const E57Field& f = *scan.find(kCartesian[i]);
     all_f32 = all_f32 && f.kind == E57Field::Kind::f32;
-    all_fixed = all_fixed && f.kind == E57Field::Kind::scaled && fits<std::int32_t>(f.min, f.max) && f.scale > 0;
+    all_fixed =
+        all_fixed && f.kind == E57Field::Kind::scaled && fits<std::int32_t>(f.min, f.max) && f.scale > 0;
     fixed.scale[i] = f.scale;
     fixed.offset[i] = f.offset;
   }
@@ -107,7 +110,8 @@ Status check(const E57Description& d) {
 
 std::vector<std::string> coordinate_fields(const E57Scan& scan) {
   for (const auto* names : {&kCartesian, &kSpherical}) {
-    if (std::all_of(names->begin(), names->end(), [&](const std::string& n) { return scan.find(n) != nullptr; }))
+    if (std::all_of(names->begin(), names->end(),
+                    [&](const std::string& n) { return scan.find(n) != nullptr; }))
       return *names;
   }
   return {};
@@ -133,8 +137,10 @@ Result<E57Columns> E57Columns::choose(const E57Description& d) {
       const auto same = [&](const Column& c) { return c.field == f.name; };
       if (is_consumed(f.name) || std::any_of(r.columns.begin(), r.columns.end(), same)) continue;
       if (!common_type(d, f.name, type)) {
-        const std::string warning = "the field " + f.name + " is not kept, since not all scans have it as a number";
-        if (std::find(r.warnings.begin(), r.warnings.end(), warning) == r.warnings.end()) r.warnings.push_back(warning);
+        const std::string warning =
+            "the field " + f.name + " is not kept, since not all scans have it as a number";
+        if (std::find(r.warnings.begin(), r.warnings.end(), warning) == r.warnings.end())
+          r.warnings.push_back(warning);
         continue;
       }
       add(channel_name(f.name), type);

@@ -33,7 +33,8 @@ Status E57Packets::open() {
   if (in.u64() % 256 != 1) return malformed("has a scan whose points are no section of E57", section_);
   const std::uint64_t length = in.u64();
   const std::uint64_t data = in.u64();
-  if (length > cursor_.left() + 32) return make_error(ErrorCode::kTruncated, "has a section beyond its end", section_);
+  if (length > cursor_.left() + 32)
+    return make_error(ErrorCode::kTruncated, "has a section beyond its end", section_);
   end_ = section_ + length;
   const std::uint64_t first = E57Pages::logical(data);
   if (first < section_ + 32 || first > end_) return malformed("has a section without packets", section_);
@@ -64,7 +65,8 @@ std::uint64_t E57Packets::take(std::size_t f) {
 
 Status E57Packets::read_packet() {
   const std::uint64_t at = cursor_.offset();
-  if (at + 4 > end_) return make_error(ErrorCode::kTruncated, "has a scan whose packets end before its last point", at);
+  if (at + 4 > end_)
+    return make_error(ErrorCode::kTruncated, "has a scan whose packets end before its last point", at);
   const ByteSpan head = cursor_.take(4);
   MAPCODEC_TRY(cursor_.status());
   if (head.size() < 4) return make_error(ErrorCode::kTruncated, "ends within a packet", at);

@@ -57,14 +57,16 @@ Result<E57Field> read_field(const pugi::xml_node& node) {
   E57Field f;
   f.name = node.name();
   const std::string type = node.attribute("type").value();
-  const auto broken = [&] { return malformed("describes the field " + f.name + " with numbers that are none"); };
+  const auto broken = [&] {
+    return malformed("describes the field " + f.name + " with numbers that are none");
+  };
   if (type == "String") {
     f.kind = E57Field::Kind::text;
     return f;
   }
   if (type == "Float") {
     f.kind = std::string(node.attribute("precision").value()) == "single" ? E57Field::Kind::f32
-                                                                           : E57Field::Kind::f64;
+                                                                          : E57Field::Kind::f64;
     return f;
   }
   if (type != "Integer" && type != "ScaledInteger")
@@ -103,18 +105,23 @@ Result<E57Scan> read_scan(const pugi::xml_node& node, const pugi::xml_node& poin
 Result<std::string> read_xml(const ByteStream& file, const ByteStream& pages) {
   std::uint8_t head[48];
   MAPCODEC_ASSIGN(const std::size_t got, pages.read_at(0, head, sizeof(head)));
-  if (got < sizeof(head)) return make_error(ErrorCode::kTruncated, "ends within the first page of E57", file.size());
+  if (got < sizeof(head))
+    return make_error(ErrorCode::kTruncated, "ends within the first page of E57", file.size());
   ByteReader in(ByteSpan(head).subspan(8));
   const std::uint32_t major = in.u32();
   in.u32();
   const std::uint64_t bytes = in.u64(), at = in.u64(), length = in.u64(), page = in.u64();
-  if (major != 1) return make_error(ErrorCode::kUnsupported, "is E57 of version " + std::to_string(major) + "; 1 is read", 8);
+  if (major != 1)
+    return make_error(ErrorCode::kUnsupported, "is E57 of version " + std::to_string(major) + "; 1 is read",
+                      8);
   if (page != E57Pages::kPage)
-    return make_error(ErrorCode::kUnsupported, "has pages of " + std::to_string(page) + " bytes; 1024 are read", 40);
+    return make_error(ErrorCode::kUnsupported,
+                      "has pages of " + std::to_string(page) + " bytes; 1024 are read", 40);
   if (bytes > file.size())
-    return make_error(ErrorCode::kTruncated,
-                      "announces " + std::to_string(bytes) + " bytes, but holds " + std::to_string(file.size()),
-                      file.size());
+    return make_error(
+        ErrorCode::kTruncated,
+        "announces " + std::to_string(bytes) + " bytes, but holds " + std::to_string(file.size()),
+        file.size());
   const std::uint64_t from = E57Pages::logical(at);
   if (from > pages.size() || length > pages.size() - from)
     return make_error(ErrorCode::kTruncated, "has its description beyond the end", 24);

@@ -49,8 +49,8 @@ void store(const E57Field& f, std::uint64_t raw, const RecordField& to, std::uin
 struct ScanPlan {
   std::vector<std::size_t> coordinates;  ///< fields, three
   bool spherical = false;
-  std::vector<std::size_t> columns;        ///< fields, in the order of E57Columns
-  std::optional<std::size_t> invalid;      ///< field of the state that says whether it is a point
+  std::vector<std::size_t> columns;    ///< fields, in the order of E57Columns
+  std::optional<std::size_t> invalid;  ///< field of the state that says whether it is a point
   std::array<Vec3, 3> rotation{};
 };
 
@@ -151,7 +151,8 @@ class E57Reader final : public RecordReader {
       return;
     }
     Vec3 p;
-    for (std::size_t d = 0; d < 3; ++d) p[d] = value_of(scan.fields[plan_.coordinates[d]], raw_[plan_.coordinates[d]]);
+    for (std::size_t d = 0; d < 3; ++d)
+      p[d] = value_of(scan.fields[plan_.coordinates[d]], raw_[plan_.coordinates[d]]);
     if (plan_.spherical) {
       const auto [range, azimuth, elevation] = p;
       const double flat = range * std::cos(elevation);
@@ -187,8 +188,8 @@ Status check_sizes(const E57Description& d, std::uint64_t bytes) {
     for (const E57Field& f : scan.fields) bits += f.bits();
     if (scan.records > 1 && (bits == 0 || scan.records > bytes * 8 / bits)) {
       return make_error(ErrorCode::kTruncated, "announces " + std::to_string(scan.records) + " points of " +
-                                                   std::to_string(bits) + " bits in " + std::to_string(bytes) +
-                                                   " bytes");
+                                                   std::to_string(bits) + " bits in " +
+                                                   std::to_string(bytes) + " bytes");
     }
   }
   return {};

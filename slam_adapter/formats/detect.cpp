@@ -14,7 +14,8 @@ using namespace std::string_view_literals;
 
 constexpr FormatInfo kInfos[] = {
     {Format::unknown, "unknown",
-     "no known point format begins like this; known are PCD, PLY, LAS, VTK, PTS, PTX, XYZ and KITTI .bin"},
+     "no known point format begins like this; known are PCD, PLY, LAS, LAZ, E57, ROS bags, VTK, PTS, PTX, "
+     "XYZ and KITTI .bin"},
     {Format::pcd, "PCD", nullptr},
     {Format::ply, "PLY", nullptr},
     {Format::las, "LAS", nullptr},
@@ -25,18 +26,23 @@ constexpr FormatInfo kInfos[] = {
     {Format::kitti, "KITTI", nullptr},
     {Format::laz, "LAZ", nullptr},
     {Format::e57, "E57",
-     "convert it first, for example with 'pdal translate IN.e57 OUT.las' or CloudCompare"},
+     "this build lacks it (MAPCODEC_E57); or convert it first, for example with 'pdal translate IN.e57 "
+     "OUT.las'"},
     {Format::gzip, "gzip", "unpack it first with 'gzip -dk FILE'"},
     {Format::zip, "zip", "unpack it first with 'unzip FILE'"},
     {Format::bzip2, "bzip2", "unpack it first with 'bzip2 -dk FILE'"},
     {Format::xz, "xz", "unpack it first with 'xz -dk FILE'"},
     {Format::zstd, "zstd", "unpack it first with 'zstd -d FILE'"},
     {Format::zlib7, "7z", "unpack it first with '7z x FILE'"},
-    {Format::rosbag, "ROS bag", "export its clouds first with 'rosrun pcl_ros bag_to_pcd FILE TOPIC FOLDER'"},
+    {Format::rosbag, "ROS bag",
+     "this build lacks it (MAPCODEC_ROSBAG); or export its clouds first with 'rosrun pcl_ros bag_to_pcd FILE "
+     "TOPIC FOLDER'"},
     {Format::ros2_db, "ROS 2 bag (sqlite3)",
-     "make a ROS 1 bag of its folder first with 'rosbags-convert --src FOLDER --dst OUT.bag' (pip install rosbags)"},
+     "make a ROS 1 bag of its folder first with 'rosbags-convert --src FOLDER --dst OUT.bag' (pip install "
+     "rosbags)"},
     {Format::mcap, "MCAP (ROS 2 bag)",
-     "make a ROS 1 bag of its folder first with 'rosbags-convert --src FOLDER --dst OUT.bag' (pip install rosbags)"},
+     "make a ROS 1 bag of its folder first with 'rosbags-convert --src FOLDER --dst OUT.bag' (pip install "
+     "rosbags)"},
     {Format::rawlog, "MRPT rawlog", nullptr},
     {Format::simplemap, "MRPT simplemap", nullptr},
     {Format::mrpt_object, "MRPT object", nullptr},

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Entropy decoding of LAZ: the adaptive arithmetic coder of [Said, HPL-2004-76] with 32-bit intervals, and the
-// integer coder on it that LASzip uses [Isenburg, PE&RS 79(2), 2013].
+// Entropy decoding of LAZ: the adaptive arithmetic coder of [Said, HPL-2004-76] with 32-bit intervals, and
+// the integer coder on it that LASzip uses [Isenburg, PE&RS 79(2), 2013].
 #pragma once
 
 #include <array>

@@ -207,14 +207,14 @@ class Point14 final : public Item {
   std::size_t channel_ = 0;
 };
 
-/// What items other than the point share: a context for each channel of the scanner, begun from the last value
-/// of the channel before. Version 3 has a slip that its files keep: after a change to a channel that was known
-/// already, one value is predicted from, and remembered in, the channel before.
+/// What items other than the point share: a context for each channel of the scanner, begun from the last
+/// value of the channel before. Version 3 has a slip that its files keep: after a change to a channel that
+/// was known already, one value is predicted from, and remembered in, the channel before.
 template <class Context>
 class ByChannel {
  public:
-  ByChannel(std::size_t channel, const Context& first, bool slips) : at_(channel), slips_(slips) {
-    contexts_[channel].emplace(first);
+  ByChannel(std::size_t channel, Context first, bool slips) : at_(channel), slips_(slips) {
+    contexts_[channel].emplace(std::move(first));
   }
   /// @param last  out: whose last value counts.
   Context& choose(std::size_t channel, Context*& last) {
@@ -283,9 +283,7 @@ class Rgb14 final : public Item {
 class Bytes14 final : public Item {
  public:
   Bytes14(std::vector<Layer> layers, const std::uint8_t* first, std::size_t channel, bool slips)
-      : Item(std::move(layers)),
-        contexts_(channel, {Bytes(first, first + layers_.size()), std::vector<LazSymbols>(layers_.size())},
-                  slips) {}
+      : Item(std::move(layers)), contexts_(channel, Context(Bytes(first, first + layers_.size())), slips) {}
 
   void next(std::uint8_t* item, std::size_t& channel) override {
     Context* last = nullptr;
@@ -299,9 +297,10 @@ class Bytes14 final : public Item {
 
  private:
   struct Context {
+    explicit Context(Bytes v) : values(std::move(v)), models(values.size(), 256) {}
     Bytes values;
-    std::vector<LazSymbols> models;
-    [[nodiscard]] Context fresh() const { return {values, std::vector<LazSymbols>(values.size())}; }
+    LazModels models;
+    [[nodiscard]] Context fresh() const { return Context(values); }
   };
   ByChannel<Context> contexts_;
 };
@@ -331,14 +330,16 @@ class LayeredChunk final : public LazChunk {
     points_ = bytes.u32();
     std::vector<std::uint64_t> sizes(layers);
     for (std::uint64_t& s : sizes) s = bytes.u32();
-    if (bytes.failed()) return make_error(ErrorCode::kTruncated, "ends within the sizes of a chunk's layers", begin);
+    if (bytes.failed())
+      return make_error(ErrorCode::kTruncated, "ends within the sizes of a chunk's layers", begin);
     std::uint64_t at = bytes.offset();
     std::size_t layer = 0, offset = 0, channel = 0;
     for (const LazItem& item : items) {
       std::vector<Layer> mine(layers_of(item));
       for (Layer& l : mine) {
         const std::uint64_t size = sizes[layer++];
-        if (size > end - at) return make_error(ErrorCode::kTruncated, "has a layer that ends beyond its chunk", at);
+        if (size > end - at)
+          return make_error(ErrorCode::kTruncated, "has a layer that ends beyond its chunk", at);
         l.present = size > 0;
         if (l.present) l.decoder.begin(LazBytes(stream, at, at + size));
         at += size;

@@ -45,8 +45,8 @@ class Point10 final : public Item {
  private:
   void attributes(LazDecoder& from, std::uint32_t changed, std::size_t map) {
     if (changed & 16) {
-      intensity_[map] = static_cast<std::uint16_t>(
-          intensities_.next(from, intensity_[map], std::min<std::size_t>(map, 3)));
+      intensity_[map] =
+          static_cast<std::uint16_t>(intensities_.next(from, intensity_[map], std::min<std::size_t>(map, 3)));
     }
     laz_store(&last_[12], intensity_[map]);
     if (changed & 8) last_[15] = static_cast<std::uint8_t>(from.symbol(classes_[last_[15]]));
@@ -107,7 +107,7 @@ class Rgb final : public Item {
 
 class RawBytes final : public Item {
  public:
-  RawBytes(const std::uint8_t* first, std::size_t size) : last_(first, first + size), models_(size) {}
+  RawBytes(const std::uint8_t* first, std::size_t size) : last_(first, first + size), models_(size, 256) {}
   void next(LazDecoder& from, std::uint8_t* item) override {
     for (std::size_t i = 0; i < last_.size(); ++i)
       item[i] = last_[i] = static_cast<std::uint8_t>(last_[i] + from.symbol(models_[i]));
@@ -115,7 +115,7 @@ class RawBytes final : public Item {
 
  private:
   Bytes last_;
-  std::vector<LazSymbols> models_;
+  LazModels models_;
 };
 
 Result<std::unique_ptr<Item>> make_item(const LazItem& item, const std::uint8_t* first) {
@@ -176,7 +176,8 @@ Result<std::unique_ptr<LazChunk>> open_pointwise_chunk(const std::vector<LazItem
   LazBytes bytes(stream, begin, end);
   Bytes first(total);
   bytes.raw(first.data(), total);
-  if (bytes.failed()) return make_error(ErrorCode::kTruncated, "ends within the first point of a chunk", begin);
+  if (bytes.failed())
+    return make_error(ErrorCode::kTruncated, "ends within the first point of a chunk", begin);
   std::vector<std::unique_ptr<Item>> coders;
   for (std::size_t i = 0, at = 0; i < items.size(); at += sizes[i++]) {
     MAPCODEC_ASSIGN(std::unique_ptr<Item> coder, make_item(items[i], first.data() + at));

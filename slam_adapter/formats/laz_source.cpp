@@ -42,8 +42,8 @@ Result<LazSetup> parse_setup(ByteSpan bytes) {
   }
   MAPCODEC_TRY(in.status("the record of LASzip"));
   if (coder != 0 || s.compressor < 1 || s.compressor > 3)
-    return make_error(ErrorCode::kUnsupported, "is LAZ of an unknown compressor (" +
-                                                   std::to_string(s.compressor) + ")");
+    return make_error(ErrorCode::kUnsupported,
+                      "is LAZ of an unknown compressor (" + std::to_string(s.compressor) + ")");
   return s;
 }
 
@@ -115,16 +115,16 @@ Status check_items(const LazSetup& s, const LasHeader& h) {
     if (item.type != (i < wanted.size() ? wanted[i] : extra) || i > wanted.size())
       return malformed("is LAZ whose parts are not those of point format " + std::to_string(h.format));
     if (!is_known(item)) {
-      return make_error(ErrorCode::kUnsupported,
-                        "is LAZ by a coder that is not read (item " +
-                            std::to_string(static_cast<unsigned>(item.type)) + " version " +
-                            std::to_string(item.version) +
-                            "): unpack it first with 'laszip -i IN.laz -o OUT.las'");
+      return make_error(ErrorCode::kUnsupported, "is LAZ by a coder that is not read (item " +
+                                                     std::to_string(static_cast<unsigned>(item.type)) +
+                                                     " version " + std::to_string(item.version) +
+                                                     "): unpack it first with 'laszip -i IN.laz -o OUT.las'");
     }
     size += item.size;
   }
   if (s.items.size() < wanted.size() || size != h.stride)
-    return malformed("is LAZ whose parts do not make up its points of " + std::to_string(h.stride) + " bytes");
+    return malformed("is LAZ whose parts do not make up its points of " + std::to_string(h.stride) +
+                     " bytes");
   if ((s.compressor == 3) != (h.format >= 6))
     return malformed("is LAZ whose compressor does not fit point format " + std::to_string(h.format));
   return {};
@@ -140,9 +140,9 @@ Result<std::uint64_t> table_place(const ByteStream& stream, const LasHeader& h) 
     const std::uint64_t place = ByteReader(ByteSpan(bytes, 8)).u64();
     if (place + 1 <= 1) continue;
     if (place < h.data_offset + 8 || place + 8 > stream.size())
-      return make_error(ErrorCode::kTruncated,
-                        "ends before its table of chunks (which is to be at byte " + std::to_string(place) + ")",
-                        at);
+      return make_error(
+          ErrorCode::kTruncated,
+          "ends before its table of chunks (which is to be at byte " + std::to_string(place) + ")", at);
     return place;
   }
   return malformed("does not say where its table of chunks lies", h.data_offset);
@@ -153,7 +153,8 @@ Result<std::vector<ChunkRange>> read_table(const ByteStream& stream, const LasHe
   LazBytes bytes(stream, place, stream.size());
   const std::uint32_t version = bytes.u32(), count = bytes.u32();
   if (version != 0 || bytes.failed())
-    return make_error(ErrorCode::kUnsupported, "has a table of chunks of version " + std::to_string(version), place);
+    return make_error(ErrorCode::kUnsupported, "has a table of chunks of version " + std::to_string(version),
+                      place);
   LazDecoder decoder;
   decoder.begin(bytes);
   LazIntegers numbers(32, 2);
@@ -166,7 +167,8 @@ Result<std::vector<ChunkRange>> read_table(const ByteStream& stream, const LasHe
     const std::uint64_t chunk = static_cast<std::uint32_t>(size);
     if (decoder.failed() || chunk > place - at)
       return malformed("has a table of chunks that does not fit the file", place);
-    std::uint64_t held = s.chunk_points == kVariableChunks ? static_cast<std::uint32_t>(points) : s.chunk_points;
+    std::uint64_t held =
+        s.chunk_points == kVariableChunks ? static_cast<std::uint32_t>(points) : s.chunk_points;
     held = std::min(held, left);
     if (held > 0) chunks.push_back({at, at + chunk, held});
     at += chunk;
@@ -215,7 +217,7 @@ class LazReader final : public RecordReader {
   Status open_chunk(const ChunkRange& range) {
     const bool layered = setup_.compressor == 3;
     MAPCODEC_ASSIGN(chunk_, (layered ? open_layered_chunk : open_pointwise_chunk)(setup_.items, stream_,
-                                                                                 range.begin, range.end));
+                                                                                  range.begin, range.end));
     if (layered && chunk_->points() != range.points) {
       return make_error(ErrorCode::kMalformed,
                         "has a chunk of " + std::to_string(chunk_->points()) + " points instead of " +

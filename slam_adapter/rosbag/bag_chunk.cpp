@@ -25,8 +25,8 @@ void grow(Bytes& out, std::size_t used, std::size_t size) {
 Result<Bytes> unpack_lz4(const Bytes& packed, std::size_t size) {
   LZ4F_dctx* raw = nullptr;
   if (LZ4F_isError(LZ4F_createDecompressionContext(&raw, LZ4F_VERSION))) return broken("lz4");
-  const std::unique_ptr<LZ4F_dctx, LZ4F_errorCode_t (*)(LZ4F_dctx*)> context(
-      raw, LZ4F_freeDecompressionContext);
+  const std::unique_ptr<LZ4F_dctx, LZ4F_errorCode_t (*)(LZ4F_dctx*)> context(raw,
+                                                                             LZ4F_freeDecompressionContext);
   Bytes out;
   std::size_t in = 0, used = 0;
   for (;;) {

@@ -43,7 +43,8 @@ class Walk {
     if (head.size() < 4) return truncated(at);
     const std::uint32_t size = ByteReader(head).u32();
     if (size > cursor_.left()) return truncated(at);
-    if (size > most) return malformed(std::string("holds ") + what + " of " + std::to_string(size) + " bytes", at);
+    if (size > most)
+      return malformed(std::string("holds ") + what + " of " + std::to_string(size) + " bytes", at);
     const ByteSpan bytes = cursor_.take(size);
     MAPCODEC_TRY(cursor_.status());
     if (bytes.size() < size) return truncated(at);
@@ -165,8 +166,9 @@ Result<BagFile> BagFile::open(const ByteStream& stream) {
   MAPCODEC_TRY(cursor.status());
   const std::string magic(head.begin(), head.end());
   if (magic != "#ROSBAG V2.0\n")
-    return make_error(ErrorCode::kUnsupported,
-                      "is no ROS bag of format 2.0: bring it there first with 'rosbag fix' or 'rosbag reindex'");
+    return make_error(
+        ErrorCode::kUnsupported,
+        "is no ROS bag of format 2.0: bring it there first with 'rosbag fix' or 'rosbag reindex'");
   BagFile bag;
   MAPCODEC_TRY(Walk(stream, bag).run());
   if (bag.chunks.empty()) return make_error(ErrorCode::kEmpty, "holds no message (no chunk)");

@@ -58,6 +58,10 @@ class BagMessages {
   /// False at the end. Errors: Malformed, Truncated, Unsupported, LimitExceeded (with the chunk's byte).
   [[nodiscard]] Result<bool> next(BagMessage& message);
   void rewind();
+  /// Of the chunk that the last message came from, in the file.
+  [[nodiscard]] std::uint64_t chunk_offset() const {
+    return chunk_ == 0 ? 0 : bag_.chunks[chunk_ - 1].offset;
+  }
 
  private:
   [[nodiscard]] Result<bool> load_chunk();

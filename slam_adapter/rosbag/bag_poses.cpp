@@ -57,19 +57,25 @@ Status BagPoses::read_odometry_topic(const BagFile& bag, const ByteStream& strea
   if (others) warnings_.push_back("of several topics of odometry " + topic + " is taken");
   BagMessages messages(bag, stream, chosen);
   BagMessage m;
+  std::uint64_t broken = 0;
   for (;;) {
     MAPCODEC_ASSIGN(const bool more, messages.next(m));
     if (!more) break;
-    MAPCODEC_ASSIGN(const RosTransform t, read_odometry(m.bytes));
+    MAPCODEC_ASSIGN(std::optional<RosTransform> t, read_odometry(m.bytes));
+    if (!t) {
+      ++broken;
+      continue;
+    }
     if (base_.empty()) {
-      base_ = t.child.empty() ? "base_link" : t.child;
+      base_ = t->child.empty() ? "base_link" : t->child;
       tree_.forget(base_);
     }
-    RosTransform named = t;
-    named.child = base_;
-    tree_.add(named, false);
+    t->child = base_;
+    tree_.add(*t, false);
     if (tree_.size() > kMostTransforms) return too_many();
   }
+  if (broken > 0)
+    warnings_.push_back(std::to_string(broken) + " messages of odometry hold no pose and are left out");
   return {};
 }
 

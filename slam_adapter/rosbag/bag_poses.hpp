@@ -27,8 +27,8 @@ class BagPoses {
   [[nodiscard]] Status read_odometry_topic(const BagFile& bag, const ByteStream& stream);
 
   FrameTree tree_;
-  std::string fixed_;      ///< as asked for; empty: the root
-  std::string base_;       ///< whose pose odometry tells
+  std::string fixed_;  ///< as asked for; empty: the root
+  std::string base_;   ///< whose pose odometry tells
   bool odometry_ = false;
   std::vector<std::string> warnings_;
 };

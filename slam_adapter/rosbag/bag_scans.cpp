@@ -2,6 +2,7 @@
 #include "slam_adapter/rosbag/bag_scans.hpp"
 
 #include <algorithm>
+#include <map>
 
 #include "slam_adapter/formats/record_source.hpp"
 #include "slam_adapter/rosbag/bag_poses.hpp"
@@ -34,6 +35,13 @@ std::int64_t stamp_of(const RosHeader& header, std::int64_t recorded_ns) {
   return header.stamp_ns != 0 ? header.stamp_ns : recorded_ns;
 }
 
+/// The error of a message, with the place of its chunk.
+template <class T>
+Result<T> in_chunk(Result<T> result, const BagMessages& messages) {
+  if (result.ok() || result.error().offset) return result;
+  return make_error(result.error().code, result.error().message, messages.chunk_offset());
+}
+
 class Scans final : public BagScans {
  public:
   Scans(std::unique_ptr<ByteStream> stream, BagFile bag) : stream_(std::move(stream)), bag_(std::move(bag)) {}
@@ -54,7 +62,7 @@ class Scans final : public BagScans {
     for (;;) {
       MAPCODEC_ASSIGN(const bool more, messages_->next(m));
       if (!more) return false;
-      MAPCODEC_ASSIGN(const RosCloud cloud, read_cloud(m.bytes));
+      MAPCODEC_ASSIGN(const RosCloud cloud, in_chunk(read_cloud(m.bytes), *messages_));
       ++seen_;
       scan.topic = bag_.connections.at(m.connection).topic;
       scan.frame = cloud.header.frame;
@@ -64,7 +72,7 @@ class Scans final : public BagScans {
         ++without_pose_;
         continue;
       }
-      MAPCODEC_ASSIGN(scan.points, decode_cloud(cloud));
+      MAPCODEC_ASSIGN(scan.points, in_chunk(decode_cloud(cloud), *messages_));
       if (conform(scan.points, layout_)) return true;
       ++without_layout_;
     }
@@ -95,13 +103,12 @@ class Scans final : public BagScans {
       return make_error(ErrorCode::kEmpty,
                         std::string("holds no ") + kCloudType + "; it has " + list_topics(bag_, ""));
     for (const std::string& topic : options.topics) {
-      const bool there = std::any_of(clouds_.begin(), clouds_.end(), [&](std::uint32_t c) {
-        return bag_.connections.at(c).topic == topic;
-      });
+      const bool there = std::any_of(clouds_.begin(), clouds_.end(),
+                                     [&](std::uint32_t c) { return bag_.connections.at(c).topic == topic; });
       if (!there)
-        return make_error(ErrorCode::kInvalidArgument, "has no clouds on the topic " + topic +
-                                                           "; it has them on " +
-                                                           list_topics(bag_, kCloudType));
+        return make_error(
+            ErrorCode::kInvalidArgument,
+            "has no clouds on the topic " + topic + "; it has them on " + list_topics(bag_, kCloudType));
     }
     if (options.topics.empty()) return {};
     std::erase_if(clouds_, [&](std::uint32_t c) {
@@ -113,20 +120,23 @@ class Scans final : public BagScans {
 
   /// The first message of each connection tells its layout.
   Status find_layout() {
+    std::map<std::uint32_t, PointCloud> found;
+    BagMessages messages(bag_, *stream_, clouds_);
+    BagMessage m;
+    while (found.size() < clouds_.size()) {
+      MAPCODEC_ASSIGN(const bool more, messages.next(m));
+      if (!more) break;
+      if (found.count(m.connection) > 0) continue;
+      MAPCODEC_ASSIGN(const RosCloud cloud, in_chunk(read_cloud(m.bytes), messages));
+      MAPCODEC_ASSIGN(found[m.connection], in_chunk(cloud_layout(cloud), messages));
+    }
+    if (found.empty()) return make_error(ErrorCode::kEmpty, std::string("holds no message of ") + kCloudType);
     std::vector<PointCloud> layouts;
     std::vector<std::string> names;
-    for (const std::uint32_t c : clouds_) {
-      BagMessages messages(bag_, *stream_, {c});
-      BagMessage m;
-      MAPCODEC_ASSIGN(const bool any, messages.next(m));
-      if (!any) continue;
-      MAPCODEC_ASSIGN(const RosCloud cloud, read_cloud(m.bytes));
-      MAPCODEC_ASSIGN(PointCloud layout, cloud_layout(cloud));
+    for (auto& [number, layout] : found) {
       layouts.push_back(std::move(layout));
-      names.push_back(bag_.connections.at(c).topic);
+      names.push_back(bag_.connections.at(number).topic);
     }
-    if (layouts.empty())
-      return make_error(ErrorCode::kEmpty, std::string("holds no message of ") + kCloudType);
     layout_ = common_layout(layouts, names, warnings_);
     return {};
   }
@@ -137,8 +147,9 @@ class Scans final : public BagScans {
       MAPCODEC_ASSIGN(poses_, BagPoses::read(bag_, *stream_, options, options.poses));
       MAPCODEC_ASSIGN(const bool any, any_pose());
       if (any) return {};
-      return make_error(ErrorCode::kEmpty,
-                        "holds no cloud whose pose is known at its time; --poses none takes them as they lie");
+      return make_error(
+          ErrorCode::kEmpty,
+          "holds no cloud whose pose is known at its time; --poses none takes them as they lie");
     }
     for (const Poses p : {Poses::tf, Poses::odometry}) {
       if (!mapcodec::has_poses(bag_, p)) continue;
@@ -148,10 +159,11 @@ class Scans final : public BagScans {
     }
     poses_.reset();
     if (!options.frame.empty())
-      return make_error(ErrorCode::kEmpty, "holds no cloud whose pose in the frame " + options.frame +
-                                               " is known at its time");
+      return make_error(ErrorCode::kEmpty,
+                        "holds no cloud whose pose in the frame " + options.frame + " is known at its time");
     warnings_.emplace_back(
-        "neither tf nor odometry knows the sensor's pose: all clouds are taken as they lie, in their own frames");
+        "neither tf nor odometry knows the sensor's pose: all clouds are taken as they lie, in their own "
+        "frames");
     return {};
   }
 
@@ -161,7 +173,7 @@ class Scans final : public BagScans {
     for (;;) {
       MAPCODEC_ASSIGN(const bool more, messages.next(m));
       if (!more) return false;
-      MAPCODEC_ASSIGN(const RosCloud cloud, read_cloud(m.bytes));
+      MAPCODEC_ASSIGN(const RosCloud cloud, in_chunk(read_cloud(m.bytes), messages));
       if (poses_->at(cloud.header.frame, stamp_of(cloud.header, m.time_ns))) return true;
     }
   }

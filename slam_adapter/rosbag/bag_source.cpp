@@ -95,8 +95,7 @@ Result<std::unique_ptr<PointSource>> open_bag(std::unique_ptr<ByteStream> stream
                                               const ReadOptions& options) {
   auto scans = BagScans::open(std::move(stream), options.bag);
   if (!scans.ok()) return named(name, scans.error());
-  return std::unique_ptr<PointSource>(
-      std::make_unique<BagSource>(std::move(scans).value(), name, options));
+  return std::unique_ptr<PointSource>(std::make_unique<BagSource>(std::move(scans).value(), name, options));
 }
 
 }  // namespace mapcodec

@@ -44,8 +44,8 @@ Result<PointCloud> decode_cloud(const RosCloud& message) {
   MAPCODEC_ASSIGN(const RecordPlan plan, plan_of(message));
   const std::uint64_t points = std::uint64_t{message.width} * message.height;
   if (points > kMostPoints)
-    return make_error(ErrorCode::kLimitExceeded, "a PointCloud2 has " + std::to_string(points) +
-                                                     " points; at most 67,108,864 are read");
+    return make_error(ErrorCode::kLimitExceeded,
+                      "a PointCloud2 has " + std::to_string(points) + " points; at most 67,108,864 are read");
   PointCloud cloud = plan.layout.like();
   if (points == 0) return cloud;
   const bool padded = message.height > 1 && message.row_step != message.width * message.point_step;

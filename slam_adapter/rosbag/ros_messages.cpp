@@ -102,15 +102,14 @@ Result<std::vector<RosTransform>> read_transforms(ByteSpan message, std::uint64_
   return r;
 }
 
-Result<RosTransform> read_odometry(ByteSpan message) {
+Result<std::optional<RosTransform>> read_odometry(ByteSpan message) {
   ByteReader in(message);
   RosTransform r;
   r.header = header(in);
   r.child = frame_name(in);
   r.pose = pose(in);
   MAPCODEC_TRY(in.status("a message of odometry"));
-  if (!normalize(r.pose)) return make_error(ErrorCode::kMalformed, "odometry has a pose that is none");
-  return r;
+  return normalize(r.pose) ? std::optional(std::move(r)) : std::nullopt;
 }
 
 Result<RosCloud> read_cloud(ByteSpan message) {

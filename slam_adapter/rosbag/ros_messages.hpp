@@ -4,6 +4,7 @@
 // all of ROS, and these few are small.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -38,8 +39,8 @@ struct RosCloud {
 /// tf2_msgs/TFMessage and tf/tfMessage. Transforms with a rotation that is none are left out and counted in
 /// `broken`. Errors of all: Truncated, Malformed. Threads: pure.
 [[nodiscard]] Result<std::vector<RosTransform>> read_transforms(ByteSpan message, std::uint64_t& broken);
-/// nav_msgs/Odometry: the pose of child_frame_id in its header's frame.
-[[nodiscard]] Result<RosTransform> read_odometry(ByteSpan message);
+/// nav_msgs/Odometry: the pose of child_frame_id in its header's frame; nothing where it is no pose.
+[[nodiscard]] Result<std::optional<RosTransform>> read_odometry(ByteSpan message);
 /// Fields lie within the record, rows within the data.
 [[nodiscard]] Result<RosCloud> read_cloud(ByteSpan message);
 

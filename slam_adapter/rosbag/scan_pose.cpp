@@ -74,8 +74,7 @@ ScanPose interpolate(const ScanPose& a, const ScanPose& b, double share) {
     return r;
   }
   const double angle = std::acos(c);
-  r.rotation_xyzw =
-      weighted(a.rotation_xyzw, std::sin((1 - share) * angle), to, std::sin(share * angle));
+  r.rotation_xyzw = weighted(a.rotation_xyzw, std::sin((1 - share) * angle), to, std::sin(share * angle));
   return r;
 }
 

@@ -29,7 +29,8 @@ void laz(SeedFolder& folder) {
 void e57(SeedFolder& folder) {
   auto moved = e57_test::colored_scan(10);
   moved.pose = "<pose><rotation><w>1</w></rotation><translation><x>10</x></translation></pose>";
-  for (const auto& scans : {std::vector{e57_test::colored_scan(30)}, std::vector{e57_test::colored_scan(5), moved}}) {
+  for (const auto& scans :
+       {std::vector{e57_test::colored_scan(30)}, std::vector{e57_test::colored_scan(5), moved}}) {
     const std::string file = e57_test::write_e57(scans, 2);
     std::string logical;
     for (std::size_t at = 0; at < file.size(); at += 1024) logical += file.substr(at, 1020);
@@ -39,7 +40,8 @@ void e57(SeedFolder& folder) {
 
 void rosbag(SeedFolder& folder) {
   for (const char* compression : {"none", "lz4", "bz2"}) {
-    for (const char poses : {0, 2}) write(folder, "rosbag", std::string(1, poses) + rosbag_test::driving_bag(compression));
+    for (const char poses : {0, 2})
+      write(folder, "rosbag", std::string(1, poses) + rosbag_test::driving_bag(compression));
   }
   write(folder, "rosbag", std::string(1, '\0') + rosbag_test::driving_bag("none", false));
 }
@@ -50,7 +52,8 @@ void file_seeds(SeedFolder& folder) {
   laz(folder);
   e57(folder);
   rosbag(folder);
-  write(folder, "autoware", "x_resolution: 20.0\ny_resolution: 20.0\nA.pcd: [1200, 2500]\n\"B.pcd\": [-1300, 0.5] # b\n");
+  write(folder, "autoware",
+        "x_resolution: 20.0\ny_resolution: 20.0\nA.pcd: [1200, 2500]\n\"B.pcd\": [-1300, 0.5] # b\n");
 }
 
 }  // namespace mapcodec::fuzz

@@ -45,14 +45,16 @@ CompressOptions lossless() {
 }
 
 TEST(Autoware, MetadataThereAndBack) {
-  const auto m = parse_autoware_metadata("x_resolution: 100.0\ny_resolution: 150.0\nA.pcd: [1200, 2500] # -> 1200 < x\nB.pcd: [-1300, 0]\n");
+  const auto m = parse_autoware_metadata(
+      "x_resolution: 100.0\ny_resolution: 150.0\nA.pcd: [1200, 2500] # -> 1200 < x\nB.pcd: [-1300, 0]\n");
   ASSERT_TRUE(m.ok()) << m.error().to_string();
   EXPECT_EQ(m->x_resolution_m, 100);
   EXPECT_EQ(m->y_resolution_m, 150);
   ASSERT_EQ(m->tiles.size(), 2u);
   EXPECT_EQ(m->tiles[1].file, "B.pcd");
   EXPECT_EQ(m->tiles[1].x, -1300);
-  EXPECT_EQ(format_autoware_metadata(*m), "x_resolution: 100.0\ny_resolution: 150.0\nA.pcd: [1200, 2500]\nB.pcd: [-1300, 0]\n");
+  EXPECT_EQ(format_autoware_metadata(*m),
+            "x_resolution: 100.0\ny_resolution: 150.0\nA.pcd: [1200, 2500]\nB.pcd: [-1300, 0]\n");
 }
 
 TEST(Autoware, MetadataThatIsNone) {
@@ -106,22 +108,27 @@ TEST(Autoware, RegionsSizesAndPlaces) {
   ASSERT_TRUE(export_autoware(map, folder / "part", region, std::nullopt, {}, options).ok());
   const ReadBack part = drain(open_source(folder / "part"));
   EXPECT_EQ(part.cloud.size(), MapFile::open(map)->read(region).value().size());
-  EXPECT_EQ(export_autoware(map, folder / "part", {}, std::nullopt, {}, options).error().code, ErrorCode::kCannotWrite);
+  EXPECT_EQ(export_autoware(map, folder / "part", {}, std::nullopt, {}, options).error().code,
+            ErrorCode::kCannotWrite);
   options.overwrite = true;
   EXPECT_TRUE(export_autoware(map, folder / "part", {}, std::nullopt, {}, options).ok());
   EXPECT_EQ(drain(open_source(folder / "part")).cloud.size(), 5000u);
-  EXPECT_EQ(export_autoware(map, folder / "street.pcd", {}, std::nullopt, {}, options).error().code, ErrorCode::kCannotWrite);
+  EXPECT_EQ(export_autoware(map, folder / "street.pcd", {}, std::nullopt, {}, options).error().code,
+            ErrorCode::kCannotWrite);
   options.tile_size_m = 2.5;
-  EXPECT_EQ(export_autoware(map, folder / "half", {}, std::nullopt, {}, options).error().code, ErrorCode::kInvalidArgument);
+  EXPECT_EQ(export_autoware(map, folder / "half", {}, std::nullopt, {}, options).error().code,
+            ErrorCode::kInvalidArgument);
   region.box = Box{{1000, 0, 0}, {1001, 1, 1}};
   options.tile_size_m = 20;
-  EXPECT_EQ(export_autoware(map, folder / "none", region, std::nullopt, {}, options).error().code, ErrorCode::kEmpty);
+  EXPECT_EQ(export_autoware(map, folder / "none", region, std::nullopt, {}, options).error().code,
+            ErrorCode::kEmpty);
   EXPECT_EQ(folder.files(), 3u);  // nothing half written
 }
 
 TEST(Autoware, MissingAndUnlikeTiles) {
   const Folder folder;
-  write_bytes(folder / "pointcloud_map_metadata.yaml", "x_resolution: 20\ny_resolution: 20\na.pcd: [0, 0]\nb.pcd: [20, 0]\n");
+  write_bytes(folder / "pointcloud_map_metadata.yaml",
+              "x_resolution: 20\ny_resolution: 20\na.pcd: [0, 0]\nb.pcd: [20, 0]\n");
   ASSERT_TRUE(write_cloud(folder / "a.pcd", street(10)).ok());
   EXPECT_TRUE(fails_with(drain(open_source(folder / ".")), ErrorCode::kNotFound, "b.pcd"));
   PointCloud plain = street(10);

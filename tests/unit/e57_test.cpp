@@ -14,7 +14,9 @@ using namespace formats_test;
 using namespace e57_test;
 using Kind = CoordinateFormat::Kind;
 
-ReadBack read_e57(const std::string& bytes) { return read_text(bytes, "scan.e57"); }
+ReadBack read_e57(const std::string& bytes) {
+  return read_text(bytes, "scan.e57");
+}
 
 TEST(E57, FloatsColourAndStates) {
   for (const std::size_t pieces : {1u, 2u, 7u}) {
@@ -108,7 +110,8 @@ TEST(E57, CutAndFlippedFilesNeverCrash) {
       logical[i] = static_cast<char>(logical[i] ^ flip);
     }
   }
-  for (std::size_t size = 0; size < whole.size(); size += 7) EXPECT_FALSE(read_e57(whole.substr(0, size)).status.ok()) << size;
+  for (std::size_t size = 0; size < whole.size(); size += 7)
+    EXPECT_FALSE(read_e57(whole.substr(0, size)).status.ok()) << size;
 }
 
 }  // namespace

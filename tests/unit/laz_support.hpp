@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A writer of LAZ for tests: the coders of the LAZ specification from the encoder's side, by the plainest choice
-// wherever the format leaves one.
+// A writer of LAZ for tests: the coders of the LAZ specification from the encoder's side, by the plainest
+// choice wherever the format leaves one.
 #pragma once
 
 #include <algorithm>
@@ -106,7 +106,8 @@ class Encoder {
 
 class Integers {
  public:
-  explicit Integers(unsigned bits = 32, unsigned contexts = 1) : bits_(bits), lengths(contexts, Symbols(bits + 1)) {
+  explicit Integers(unsigned bits = 32, unsigned contexts = 1)
+      : bits_(bits), lengths(contexts, Symbols(bits + 1)) {
     for (unsigned i = 1; i <= bits; ++i) corrections.emplace_back(1u << std::min(i, 8u));
   }
   void put(Encoder& to, std::int32_t prediction, std::int32_t value, std::size_t context = 0) {
@@ -143,7 +144,9 @@ T get(const std::string& from, std::size_t at) {
   std::memcpy(&v, from.data() + at, sizeof(T));
   return v;
 }
-inline std::uint8_t u8(const std::string& s, std::size_t at) { return static_cast<std::uint8_t>(s[at]); }
+inline std::uint8_t u8(const std::string& s, std::size_t at) {
+  return static_cast<std::uint8_t>(s[at]);
+}
 
 /// Position of both generations: medians of differences, contexts by bits.
 struct Xyz {
@@ -151,7 +154,8 @@ struct Xyz {
   std::array<std::int32_t, 8> heights{};
   Integers dx{32, 2}, dy{32, 22}, z{32, 20};
   void put_xy(Encoder& to, const std::string& a, const std::string& b, std::size_t map, std::size_t single) {
-    const auto ddx = get<std::int32_t>(b, 0) - get<std::int32_t>(a, 0), ddy = get<std::int32_t>(b, 4) - get<std::int32_t>(a, 4);
+    const auto ddx = get<std::int32_t>(b, 0) - get<std::int32_t>(a, 0),
+               ddy = get<std::int32_t>(b, 4) - get<std::int32_t>(a, 4);
     dx.put(to, x[map].get(), ddx, single);
     x[map].add(ddx);
     dy.put(to, y[map].get(), ddy, single + even_bits(dx.k, 20));
@@ -254,7 +258,8 @@ inline std::string layered_chunk(const std::vector<std::string>& rows) {
     sources.put(layers[7], get<std::uint16_t>(a, 20), get<std::uint16_t>(b, 20));
     if (later) times.put(layers[8], get<std::uint64_t>(a, 22), get<std::uint64_t>(b, 22));
     colors.put(layers[9], a, b, 30);
-    for (std::size_t k = 0; k < extra; ++k) layers[10 + k].symbol(bytes[k], (u8(b, 36 + k) - u8(a, 36 + k)) & 255);
+    for (std::size_t k = 0; k < extra; ++k)
+      layers[10 + k].symbol(bytes[k], (u8(b, 36 + k) - u8(a, 36 + k)) & 255);
   }
   std::string r = rows[0], body;
   put(r, static_cast<std::uint32_t>(rows.size()));
@@ -346,7 +351,8 @@ inline std::vector<std::string> rows(unsigned format, std::size_t count, std::si
     if (format == 3) {
       row += std::string("\x09", 1) + static_cast<char>(random() % 7) + std::string(4, '\5');
     } else {
-      row += std::string("\x11\x40", 2) + static_cast<char>(random() % 40) + static_cast<char>(random() % 200);
+      row +=
+          std::string("\x11\x40", 2) + static_cast<char>(random() % 40) + static_cast<char>(random() % 200);
       put(row, static_cast<std::int16_t>(int(random() % 2000) - 1000));
       put(row, static_cast<std::uint16_t>(random() % 5));
     }

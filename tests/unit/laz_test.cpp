@@ -40,7 +40,8 @@ TEST(Laz, PointwiseChunks) {
   for (const std::size_t extra : {0u, 3u}) {
     const auto rows = laz_test::rows(3, 5000, extra, 1);
     File f = laz_test::pointwise_file(extra);
-    for (const auto& [begin, end] : {std::pair<std::size_t, std::size_t>{0, 3000}, {3000, 3001}, {3001, 5000}})
+    for (const auto& [begin, end] :
+         {std::pair<std::size_t, std::size_t>{0, 3000}, {3000, 3001}, {3001, 5000}})
       f.chunks.emplace_back(end - begin, laz_test::pointwise_chunk(slice(rows, begin, end)));
     expect_same(read_text(laz_test::write_laz(f), "a.laz"), expected(3, rows));
     f.table_at_end = true;
@@ -56,7 +57,8 @@ TEST(Laz, OneChunkWithoutTableAndChunksOfOneSize) {
   expect_same(read_text(laz_test::write_laz(f), "a.laz"), expected(3, rows));
   f.compressor = 2;
   f.chunk_points = 500;
-  f.chunks = {{500, laz_test::pointwise_chunk(slice(rows, 0, 500))}, {200, laz_test::pointwise_chunk(slice(rows, 500, 700))}};
+  f.chunks = {{500, laz_test::pointwise_chunk(slice(rows, 0, 500))},
+              {200, laz_test::pointwise_chunk(slice(rows, 500, 700))}};
   expect_same(read_text(laz_test::write_laz(f), "a.laz"), expected(3, rows));
 }
 
@@ -64,13 +66,14 @@ TEST(Laz, LayeredChunks) {
   for (const std::size_t extra : {0u, 2u}) {
     const auto rows = laz_test::rows(7, 4000, extra, 3);
     File f = laz_test::layered_file(extra);
-    f.chunks = {{2500, laz_test::layered_chunk(slice(rows, 0, 2500))}, {1500, laz_test::layered_chunk(slice(rows, 2500, 4000))}};
+    f.chunks = {{2500, laz_test::layered_chunk(slice(rows, 0, 2500))},
+                {1500, laz_test::layered_chunk(slice(rows, 2500, 4000))}};
     expect_same(read_text(laz_test::write_laz(f), "a.laz"), expected(7, rows));
   }
 }
 
-/// Any bytes are symbols: what no plain encoder writes (changes of channel, sequences of times, returns, infrared)
-/// is decoded from noise, twice alike and without an end before its time.
+/// Any bytes are symbols: what no plain encoder writes (changes of channel, sequences of times, returns,
+/// infrared) is decoded from noise, twice alike and without an end before its time.
 TEST(Laz, NoiseIsDecodedAlike) {
   std::mt19937 random(4);
   const auto noise = [&](std::size_t n) {
@@ -94,7 +97,8 @@ TEST(Laz, NoiseIsDecodedAlike) {
   ASSERT_TRUE(a.status.ok()) << message(a);
   expect_same(b, a.cloud);
   std::array<bool, 4> channels{};
-  for (std::size_t i = 0; i < a.cloud.size(); ++i) channels[a.cloud.find("scanner_channel")->get<std::uint8_t>(i)] = true;
+  for (std::size_t i = 0; i < a.cloud.size(); ++i)
+    channels[a.cloud.find("scanner_channel")->get<std::uint8_t>(i)] = true;
   EXPECT_EQ(channels, (std::array<bool, 4>{true, true, true, true}));
 }
 
@@ -106,26 +110,30 @@ TEST(Laz, WhatIsNotReadIsNamed) {
   EXPECT_TRUE(fails_with(read_text(laz_test::write_laz(f), "a.laz"), ErrorCode::kUnsupported, "laszip -i"));
   f.items[0].version = 2;
   f.items.pop_back();
-  EXPECT_TRUE(fails_with(read_text(laz_test::write_laz(f), "a.laz"), ErrorCode::kMalformed, "do not make up"));
+  EXPECT_TRUE(
+      fails_with(read_text(laz_test::write_laz(f), "a.laz"), ErrorCode::kMalformed, "do not make up"));
   f = laz_test::pointwise_file(0);
   f.chunks = {{10, laz_test::pointwise_chunk(rows)}};
   std::string bytes = laz_test::write_laz(f);
   bytes[227 + 2] = 'x';
   EXPECT_TRUE(fails_with(read_text(bytes, "a.laz"), ErrorCode::kMalformed, "without the record"));
   f.chunks[0].first = 11;
-  EXPECT_TRUE(fails_with(read_text(laz_test::write_laz(f), "a.laz"), ErrorCode::kTruncated, "before its last point") ||
+  EXPECT_TRUE(fails_with(read_text(laz_test::write_laz(f), "a.laz"), ErrorCode::kTruncated,
+                         "before its last point") ||
               read_text(laz_test::write_laz(f), "a.laz").cloud.size() == 11);
 }
 
 TEST(Laz, CutAndFlippedFilesNeverCrash) {
   const auto rows3 = laz_test::rows(3, 60, 1, 6), rows7 = laz_test::rows(7, 60, 1, 7);
   File a = laz_test::pointwise_file(1), b = laz_test::layered_file(1);
-  a.chunks = {{30, laz_test::pointwise_chunk(slice(rows3, 0, 30))}, {30, laz_test::pointwise_chunk(slice(rows3, 30, 60))}};
+  a.chunks = {{30, laz_test::pointwise_chunk(slice(rows3, 0, 30))},
+              {30, laz_test::pointwise_chunk(slice(rows3, 30, 60))}};
   b.chunks = {{60, laz_test::layered_chunk(rows7)}};
   for (const File& f : {a, b}) {
     const std::string whole = laz_test::write_laz(f);
     // The last four bytes are zeros that no decoder asks for.
-    for (std::size_t size = 0; size + 5 < whole.size(); size += 3) EXPECT_FALSE(read_text(whole.substr(0, size), "a.laz").status.ok()) << size;
+    for (std::size_t size = 0; size + 5 < whole.size(); size += 3)
+      EXPECT_FALSE(read_text(whole.substr(0, size), "a.laz").status.ok()) << size;
     std::string bytes = whole;
     for (std::size_t i = 0; i < bytes.size(); ++i) {
       bytes[i] = static_cast<char>(bytes[i] ^ 0x91);

@@ -23,14 +23,17 @@ template <>
 struct Serializer<Raw> {
   template <class Stream>
   static void write(Stream& stream, const Raw& raw) {
-    std::copy(raw.bytes.begin(), raw.bytes.end(), stream.advance(static_cast<std::uint32_t>(raw.bytes.size())));
+    std::copy(raw.bytes.begin(), raw.bytes.end(),
+              stream.advance(static_cast<std::uint32_t>(raw.bytes.size())));
   }
   template <class Stream>
   static void read(Stream& stream, Raw& raw) {
     const std::uint32_t n = stream.getLength();
     raw.bytes.assign(reinterpret_cast<const char*>(stream.advance(n)), n);
   }
-  static std::uint32_t serializedLength(const Raw& raw) { return static_cast<std::uint32_t>(raw.bytes.size()); }
+  static std::uint32_t serializedLength(const Raw& raw) {
+    return static_cast<std::uint32_t>(raw.bytes.size());
+  }
 };
 }  // namespace ros::serialization
 namespace ros::message_traits {
@@ -70,7 +73,8 @@ std::vector<Message> messages() {
 TEST(RosBagOracle, ReadsWhatRosWrites) {
   const formats_test::Folder folder;
   const std::vector<Message> written = messages();
-  for (const auto compression : {rosbag::compression::Uncompressed, rosbag::compression::BZ2, rosbag::compression::LZ4}) {
+  for (const auto compression :
+       {rosbag::compression::Uncompressed, rosbag::compression::BZ2, rosbag::compression::LZ4}) {
     const std::string path = folder / "ros.bag";
     {
       rosbag::Bag bag(path, rosbag::bagmode::Write);

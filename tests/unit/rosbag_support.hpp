@@ -89,7 +89,8 @@ class BagWriter {
     put_text(to, data);
   }
   static std::uint64_t time(std::int64_t ns) {
-    return static_cast<std::uint64_t>(ns / 1'000'000'000) | static_cast<std::uint64_t>(ns % 1'000'000'000) << 32;
+    return static_cast<std::uint64_t>(ns / 1'000'000'000) | static_cast<std::uint64_t>(ns % 1'000'000'000)
+                                                                << 32;
   }
   std::uint32_t connection(const Message& m, std::string& inner) {
     for (std::size_t i = 0; i < connections_.size(); ++i) {

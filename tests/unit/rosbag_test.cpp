@@ -62,7 +62,23 @@ TEST(RosBag, OdometryFramesAndNone) {
   const ReadBack base = read_bag(bag, poses(BagOptions::Poses::tf, "base_link"));
   ASSERT_EQ(base.cloud.size(), 14u);
   expect_near(base.cloud.xyz[4], {0, 1, 1});
-  EXPECT_TRUE(fails_with(read_bag(bag, poses(BagOptions::Poses::tf, "moon")), ErrorCode::kEmpty, "--poses none"));
+  EXPECT_TRUE(
+      fails_with(read_bag(bag, poses(BagOptions::Poses::tf, "moon")), ErrorCode::kEmpty, "--poses none"));
+}
+
+TEST(RosBag, PosesThatAreNoneAreLeftOutAndCounted) {
+  BagWriter bag;
+  const Transform good{"odom", "lidar", 1000, {{5, 0, 0}, {0, 0, 0, 1}}};
+  Transform bad = good;
+  bad.pose.rotation_xyzw = {0, 0, 0, 0};
+  bag.add_chunk({tf({good, bad}), odometry(bad), odometry(good), cloud(xyz_cloud({{1, 2, 3}}, 1000))});
+  for (const auto p : {BagOptions::Poses::tf, BagOptions::Poses::odometry}) {
+    const ReadBack r = read_bag(bag.finish(), poses(p));
+    ASSERT_EQ(r.cloud.size(), 1u) << message(r);
+    expect_near(r.cloud.xyz[0], {6, 2, 3});
+    ASSERT_FALSE(r.warnings.empty());
+    EXPECT_NE(r.warnings.front().find("left out"), std::string::npos) << r.warnings.front();
+  }
 }
 
 TEST(RosBag, WithoutIndexTheChunksTell) {
@@ -74,7 +90,8 @@ TEST(RosBag, WithoutIndexTheChunksTell) {
 
 TEST(RosBag, ScansOneByOneAndAgain) {
   const std::string bytes = driving_bag("lz4");
-  auto scans = BagScans::open(memory_stream(ByteSpan(reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size())), {});
+  auto scans = BagScans::open(
+      memory_stream(ByteSpan(reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size())), {});
   ASSERT_TRUE(scans.ok());
   for (int round = 0; round < 2; ++round) {
     BagScan scan;
@@ -96,8 +113,8 @@ TEST(RosBag, ScansOneByOneAndAgain) {
 TEST(RosBag, EveryTypeEveryEndPaddingAndColour) {
   for (const bool big : {false, true}) {
     Cloud c;
-    c.fields = {{"x", 0, 8},   {"y", 8, 3},    {"z", 12, 7},  {"rgb", 16, 7}, {"ring", 20, 4},
-                {"t", 24, 6},  {"hist", 28, 2, 3}, {"i8", 31, 1}, {"i32", 32, 5}};
+    c.fields = {{"x", 0, 8},  {"y", 8, 3},        {"z", 12, 7},  {"rgb", 16, 7}, {"ring", 20, 4},
+                {"t", 24, 6}, {"hist", 28, 2, 3}, {"i8", 31, 1}, {"i32", 32, 5}};
     c.point_step = 40;
     c.width = 2;
     c.height = 2;
@@ -175,10 +192,13 @@ TEST(RosBag, BadMessagesAndBags) {
     return read_bag(one_cloud(c));
   };
   EXPECT_TRUE(fails_with(bad([](Cloud& c) { c.width = 3; }), ErrorCode::kMalformed, "announces 3 points"));
-  EXPECT_TRUE(fails_with(bad([](Cloud& c) { c.fields[2].offset = 9; }), ErrorCode::kMalformed, "beyond the end"));
-  EXPECT_TRUE(fails_with(bad([](Cloud& c) { c.fields[2].datatype = 9; }), ErrorCode::kMalformed, "unknown type 9"));
+  EXPECT_TRUE(
+      fails_with(bad([](Cloud& c) { c.fields[2].offset = 9; }), ErrorCode::kMalformed, "beyond the end"));
+  EXPECT_TRUE(
+      fails_with(bad([](Cloud& c) { c.fields[2].datatype = 9; }), ErrorCode::kMalformed, "unknown type 9"));
   EXPECT_TRUE(fails_with(bad([](Cloud& c) { c.fields.pop_back(); }), ErrorCode::kMalformed, "no field z"));
-  EXPECT_TRUE(fails_with(bad([](Cloud& c) { c.fields[2].count = 0x40000000; }), ErrorCode::kMalformed, "beyond"));
+  EXPECT_TRUE(
+      fails_with(bad([](Cloud& c) { c.fields[2].count = 0x40000000; }), ErrorCode::kMalformed, "beyond"));
   BagWriter empty;
   EXPECT_TRUE(fails_with(read_bag(empty.finish()), ErrorCode::kEmpty, "no message"));
   BagWriter other;
@@ -225,7 +245,8 @@ TEST(FrameTree, InterpolatesTurnsBothWaysRound) {
   ASSERT_TRUE(half);
   expect_near(half->apply({1, 0, 0}), {std::cos(0.5), std::sin(0.5), 0});
   expect_near(tree.lookup("station", "base", 0)->apply({0, 0, 0}), {-5, 0, 0});
-  expect_near(tree.lookup("base", "station", 1000)->apply({0, 0, 0}), {5 * std::cos(1.0), -5 * std::sin(1.0), 0});
+  expect_near(tree.lookup("base", "station", 1000)->apply({0, 0, 0}),
+              {5 * std::cos(1.0), -5 * std::sin(1.0), 0});
   EXPECT_FALSE(tree.lookup("map", "base", 200'000'000));
   EXPECT_FALSE(tree.lookup("map", "unknown", 0));
 }

@@ -39,6 +39,10 @@ struct BenchSettings {
 /// one (local.json, local.md). `files` chooses: "tiles", "drive", and sequences by parts of their names.
 [[nodiscard]] Status bench_local(const BenchSettings& settings);
 
+/// Bags, LAZ, COPC, E57 and Autoware folders: read, compressed without loss, written, compared (formats.json,
+/// formats.md). A file that is refused is a row with its message.
+[[nodiscard]] Status bench_formats(const BenchSettings& settings);
+
 /// Maps built scan after scan beside maps made at once, and points taken in by a large map while it is read
 /// (update.json, update.md). `quick`: a map of 5 instead of 50 million points.
 [[nodiscard]] Status bench_update(const BenchSettings& settings);

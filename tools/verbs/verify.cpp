@@ -38,8 +38,8 @@ int run(const Arguments& a) {
   settings.arena = &arena;
   settings.progress = progress_printer(a.progress);
   settings.stop = stop_flag();
-  const auto v =
-      a.originals.empty() ? verify_map(a.map, settings) : verify_map_against(a.map, a.originals, settings, a.bag);
+  const auto v = a.originals.empty() ? verify_map(a.map, settings)
+                                     : verify_map_against(a.map, a.originals, settings, a.bag);
   settings.progress = {};
   if (!v.ok()) return fail(a.map, v.error());
   if (a.json) fmt::print("{}\n", outcome_json(*v).dump(2));
