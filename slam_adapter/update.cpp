@@ -8,6 +8,7 @@
 #include "slam_adapter/create_map.hpp"
 #include "slam_adapter/formats/formats.hpp"
 #include "slam_adapter/map_file.hpp"
+#include "slam_adapter/octomap/octree_jobs.hpp"
 #include "slam_adapter/point_batch.hpp"
 
 namespace mapcodec {
@@ -141,6 +142,7 @@ Status merge_tiles(MapUpdater& map, const MapFile& other, bool fuse, const std::
 Result<UpdateReport> update_files(const std::string& map_path, const UpdateRequest& request, Arena& arena,
                                   std::vector<std::string>& warnings) {
   if (request.pose) MAPCODEC_TRY(check_pose(request.pose->translation_m, request.pose->rotation_xyzw));
+  if (any_octree(request.inputs)) return update_octrees(map_path, request, arena);
   MAPCODEC_ASSIGN(MapUpdater map, open_or_create(map_path, request, arena, warnings));
   MAPCODEC_TRY(check_promise(map.schema(), request));
   std::uint32_t submap = 0;
