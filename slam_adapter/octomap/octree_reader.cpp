@@ -239,8 +239,9 @@ Result<OctreeFile> parse_octree(ByteSpan bytes, const DecodeLimits& limits) {
     MAPCODEC_ASSIGN(header, read_old_header(in));
     begin = in.offset();
   }
-  // Two bytes of a .bt are at most nine nodes; 24 bytes a node is more than they take in memory.
-  const std::uint64_t most = header.binary ? 4 * bytes.size() + 1 : bytes.size();
+  // Two bytes of a .bt make up to eight nodes; a node of an .ot takes at least five.
+  const std::uint64_t rest = bytes.size() - begin;
+  const std::uint64_t most = header.binary ? 4 * rest + 1 : rest / 5;
   if (header.nodes > most)
     return make_error(ErrorCode::kTruncated, "octree has fewer bytes than its header's number of nodes needs",
                       begin);

@@ -89,22 +89,6 @@ int fail_decompress(const Arguments& a, const Error& error) {
   return fail(error.code == ErrorCode::kCannotWrite ? a.output : a.map, error);
 }
 
-int write_points(const Arguments& a, const Region& region, const ReadSettings& settings) {
-  const bool octree = is_octree_name(a.output);
-  const auto r = a.as == "bt" ? insert_and_write(a, region, settings)
-                 : octree     ? decompress_octree(a.map, a.output, region, a.revision, settings)
-                              : decompress(a.map, a.output, region, a.revision, settings, a.write);
-  if (!r.ok()) return fail_decompress(a, r.error());
-  if (a.json) {
-    fmt::print("{}\n", report_json(*r).dump(2));
-  } else {
-    fmt::print("{}: {} points from {} tiles, {} read, {:.3f} s, first point after {:.1f} ms\n", a.output,
-               human_count(r->points), r->tiles_read, human_bytes(r->bytes_read), r->seconds,
-               1e3 * r->first_point_seconds);
-  }
-  return kDone;
-}
-
 #ifdef MAPCODEC_OCTOMAP
 Result<DecompressReport> insert_and_write(const Arguments& a, const Region& region,
                                           const ReadSettings& settings) {
@@ -133,6 +117,22 @@ Result<DecompressReport> insert_and_write(const Arguments&, const Region&, const
   return make_error(ErrorCode::kUnsupported, "this build has no OctoMap, which --as bt needs");
 }
 #endif
+
+int write_points(const Arguments& a, const Region& region, const ReadSettings& settings) {
+  const bool octree = is_octree_name(a.output);
+  const auto r = a.as == "bt" ? insert_and_write(a, region, settings)
+                 : octree     ? decompress_octree(a.map, a.output, region, a.revision, settings)
+                              : decompress(a.map, a.output, region, a.revision, settings, a.write);
+  if (!r.ok()) return fail_decompress(a, r.error());
+  if (a.json) {
+    fmt::print("{}\n", report_json(*r).dump(2));
+  } else {
+    fmt::print("{}: {} points from {} tiles, {} read, {:.3f} s, first point after {:.1f} ms\n", a.output,
+               human_count(r->points), r->tiles_read, human_bytes(r->bytes_read), r->seconds,
+               1e3 * r->first_point_seconds);
+  }
+  return kDone;
+}
 
 int write_surfaces(const Arguments& a, const Region& region, const ReadSettings& settings) {
   const bool planes = a.as == "planes";
