@@ -5,6 +5,7 @@
 
 #include "slam_adapter/compress_job.hpp"
 #include "slam_adapter/formats/formats.hpp"
+#include "slam_adapter/octomap/octree_jobs.hpp"
 #include "slam_adapter/order_source.hpp"
 #include "slam_adapter/schema_choice.hpp"
 
@@ -44,6 +45,7 @@ Result<CompressReport> compress_files(const std::vector<std::string>& inputs, co
   if (!options.overwrite && std::filesystem::exists(path, ignored)) {
     return make_error(ErrorCode::kCannotWrite, path + ": exists already (--force replaces it)");
   }
+  if (any_octree(inputs)) return compress_octrees(inputs, path, options);
   ReadOptions read;
   read.keep_nonfinite = options.promise == PromiseKind::lossless;
   read.unit_m = options.unit_m;

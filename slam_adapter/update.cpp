@@ -8,6 +8,7 @@
 #include "slam_adapter/create_map.hpp"
 #include "slam_adapter/formats/formats.hpp"
 #include "slam_adapter/map_file.hpp"
+#include "slam_adapter/octomap/octree_jobs.hpp"
 #include "slam_adapter/point_batch.hpp"
 #include "slam_adapter/scan_submaps.hpp"
 
@@ -148,6 +149,7 @@ Result<UpdateReport> update_files(const std::string& map_path, const UpdateReque
   if (request.each_scan && (request.pose || !request.submap.empty() || request.unit_m != 1))
     return make_error(ErrorCode::kInvalidArgument, "scans of a bag bring their own poses, names and metres");
   if (request.pose) MAPCODEC_TRY(check_pose(request.pose->translation_m, request.pose->rotation_xyzw));
+  if (any_octree(request.inputs)) return update_octrees(map_path, request, arena);
   MAPCODEC_ASSIGN(MapUpdater map, open_or_create(map_path, request, arena, warnings));
   MAPCODEC_TRY(check_promise(map.schema(), request));
   std::uint32_t submap = 0;

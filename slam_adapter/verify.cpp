@@ -3,6 +3,7 @@
 
 #include "mapcodec/quality/multiset_hash.hpp"
 #include "slam_adapter/formats/formats.hpp"
+#include "slam_adapter/octomap/octree_jobs.hpp"
 
 namespace mapcodec {
 namespace {
@@ -113,6 +114,15 @@ Status check_lossy(const MapFile& map, const std::vector<std::string>& originals
   return {};
 }
 
+/// An octree has no order and no loss: it is the same or not.
+Status check_octree(const MapFile& map, const std::vector<std::string>& originals,
+                    const ReadSettings& settings, VerifyOutcome& v) {
+  MAPCODEC_ASSIGN(const OctreeFile original, read_octrees(originals));
+  MAPCODEC_ASSIGN(const std::string difference, compare_occupancy_map(map.path(), original, settings));
+  require(v, difference.empty(), difference);
+  return {};
+}
+
 /// Every tile decodes, to as many points as the index says.
 Result<VerifyOutcome> check_tiles(const MapFile& map, const ReadSettings& settings) {
   VerifyOutcome v;
@@ -146,6 +156,10 @@ Result<VerifyOutcome> verify_map_against(const std::string& path, const std::vec
                                          const ReadSettings& settings, const BagOptions& bag) {
   MAPCODEC_ASSIGN(VerifyOutcome v, verify_map(path, settings));
   MAPCODEC_ASSIGN(const MapFile map, MapFile::open(path));
+  if (any_octree(originals)) {
+    MAPCODEC_TRY(check_octree(map, originals, settings, v));
+    return v;
+  }
   MAPCODEC_TRY(map.schema().promise == PromiseKind::lossless
                    ? check_lossless(map, originals, bag, settings, v)
                    : check_lossy(map, originals, bag, settings, v));

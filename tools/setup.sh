@@ -6,6 +6,7 @@ set -euo pipefail
 packages=(
   g++ cmake ninja-build ccache pkg-config                                   # to build
   libtbb-dev libzstd-dev libxxhash-dev libnanoflann-dev libeigen3-dev zlib1g-dev  # libraries
+  liboctomap-dev                                                            # octrees of OctoMap
   libcgal-dev libgmp-dev libmpfr-dev libpcl-dev                             # the 2014 paper's encoder, test oracles
   libcli11-dev libspdlog-dev nlohmann-json3-dev libpng-dev                  # the programs
   libdraco-dev gnuplot-nox zstd xz-utils                                    # what the benchmarks compare with and draw
