@@ -317,11 +317,27 @@ Status CompressJob::encode_once() {
   pipeline.progress = options_.progress;
   pipeline.stop = options_.stop;
   pipeline.tile_seconds = &report_.tile_seconds;
+  if (is_coded()) return store_coded();
   MapSchema target = schema_;
   if (const auto color = bounded_color()) target.channels[*color].bound *= color_target_;
   return encode_tiles(
       *tiles_, [&](const PointCloud& tile) { return encode(tile, target); }, pipeline,
       [this](const TileKey& key, EncodedTile&& t) { return store(key, std::move(t)); });
+}
+
+/// Whether the search has coded the whole map already: positions are all of it, and it was not coded since.
+bool CompressJob::is_coded() const {
+  const auto dropped = [](const ChannelSchema& c) { return c.kept == ChannelKept::dropped; };
+  return report_.codings == 0 && choice_.coded && choice_.coded->tiles.size() == tiles_->tiles().size() &&
+         std::all_of(schema_.channels.begin(), schema_.channels.end(), dropped);
+}
+
+Status CompressJob::store_coded() {
+  for (std::size_t i = 0; i < tiles_->tiles().size(); ++i)
+    MAPCODEC_TRY(store(tiles_->tiles()[i].key, std::move(choice_.coded->tiles[i])));
+  report_.tile_seconds = choice_.coded->seconds;
+  choice_.coded.reset();
+  return {};
 }
 
 /// Later codings keep to the codecs of the first: with a little other step some tiles would change over, and

@@ -35,6 +35,8 @@ class CompressJob {
   [[nodiscard]] Status encode_until_kept();
   [[nodiscard]] Status encode_once();
   [[nodiscard]] Result<EncodedTile> encode(const PointCloud& tile, const MapSchema& target) const;
+  [[nodiscard]] bool is_coded() const;
+  [[nodiscard]] Status store_coded();
   [[nodiscard]] Status store(const TileKey& key, EncodedTile&& t);
   [[nodiscard]] Status commit();
 
