@@ -53,6 +53,21 @@ Result<double> color_floor_at(double step_m, std::size_t channel, const TileSamp
   });
 }
 
+/// The smallest coding that keeps the promise: sizes do not fall evenly with the step.
+struct Kept {
+  double step_m = 0, bits = INFINITY;
+  CodedSum sum;
+  CodedTiles coded;
+
+  void take_if_smaller(double step, const CodedSum& s, CodedTiles&& tiles) {
+    if (s.geometry_bits_per_point() >= bits) return;
+    step_m = step;
+    bits = s.geometry_bits_per_point();
+    sum = s;
+    coded = std::move(tiles);
+  }
+};
+
 }  // namespace
 
 Result<CodedSum> RateSearch::measure(const CodingPlan& plan) const {
@@ -66,6 +81,7 @@ Status RateSearch::seek_on(const TileSample& sample, CodingPlan& plan, const Map
   const double close = sample.whole ? kCloseEnoughOnAll : kCloseEnough;
   const bool for_good = sample.whole && value == &CodedSum::rms_m;
   CodedTiles coded;
+  Kept smallest;
   coded_.reset();
   for (int i = 0; i < kMostTries; ++i) {
     CodingPlan trial = plan;
@@ -74,10 +90,13 @@ Status RateSearch::seek_on(const TileSample& sample, CodingPlan& plan, const Map
     with_step.step_m = plan.step_m;
     MAPCODEC_ASSIGN(found_, encode_sample(sample, with_step, trial, arena_, stop_, &coded));
     const double got = (found_.*value)();
+    if (for_good && got <= target / kRmsAim) smallest.take_if_smaller(plan.step_m, found_, std::move(coded));
     if (for_good && is_kept(i, got / target)) {
-      expected_bits_ = found_.geometry_bits_per_point();
+      plan.step_m = smallest.step_m;
+      found_ = smallest.sum;
+      expected_bits_ = smallest.bits;
       leapt_ = false;
-      coded_ = std::move(coded);
+      coded_ = std::move(smallest.coded);
       return {};
     }
     const double next = std::clamp(secant.next(plan.step_m, got), steps.finest, steps.coarsest);
