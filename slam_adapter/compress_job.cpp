@@ -72,6 +72,7 @@ Result<CompressReport> CompressJob::run() {
   report_.tiling_seconds = lap(at);
   MAPCODEC_ASSIGN(choice_, choose_plan(options_, *tiles_, schema_, arena_, report_.warnings));
   report_.search_seconds = lap(at);
+  if (choice_.coded) searched_step_ = choice_.plan.step_m;
   if (const auto color = bounded_color(); color && !has_target() && choice_.plan.has_surfaces())
     color_loss_ = 0.6 * schema_.channels[*color].bound;
   MAPCODEC_TRY(encode_until_kept());
@@ -182,6 +183,8 @@ bool CompressJob::meets_rms_or_adjust() {
     plan.step_m *= 0.999 * promise / rms;
     return false;
   }
+  // The search has tried around it on the whole map.
+  if (plan.step_m == searched_step_ && rms <= promise) return true;
   if (coded_.surface_share() == 0 && options_.codecs == CodecChoice::cheapest) {
     // No tile took surfaces after all: one voxel side for the whole map is simpler, and its error known
     // beforehand.

@@ -67,6 +67,7 @@ class CompressJob {
   std::map<TileKey, CodecId, MortonLess> codecs_;  // of the tiles, as the first coding chose them
   Box bounds_;
   double position_step_ = 0;                     // what the positions' promise alone would allow
+  double searched_step_ = 0;                     // where the search ended on the whole map; 0: it did not
   double best_step_ = 0, best_bits_ = INFINITY;  // of the codings that kept the promise, the smallest
   std::optional<LogSecant> secant_;              // over the codings of the whole map
   int target_tries_ = 0, rms_tries_ = 0, color_tries_ = 0;

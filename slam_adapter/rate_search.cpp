@@ -92,12 +92,8 @@ Status RateSearch::seek_on(const TileSample& sample, CodingPlan& plan, const Map
     const double got = (found_.*value)();
     if (for_good && got <= target / kRmsAim) smallest.take_if_smaller(plan.step_m, found_, std::move(coded));
     if (for_good && is_kept(i, got / target)) {
-      plan.step_m = smallest.step_m;
-      found_ = smallest.sum;
-      expected_bits_ = smallest.bits;
       leapt_ = false;
-      coded_ = std::move(smallest.coded);
-      return {};
+      break;
     }
     const double next = std::clamp(secant.next(plan.step_m, got), steps.finest, steps.coarsest);
     slope = secant.slope();
@@ -108,9 +104,15 @@ Status RateSearch::seek_on(const TileSample& sample, CodingPlan& plan, const Map
     // The last stretch needs no try: the slope is known.
     leapt_ = secant.is_leap();
     // On the whole map itself being close is no end: what is found here is found for good.
-    const bool is_close = std::abs(got / target - 1) <= close && (!for_good || i + 1 >= kTriesForGood);
-    if (at_end || leapt_ || is_close) break;
+    const bool is_close = std::abs(got / target - 1) <= close && !for_good;
+    const bool is_late = i + 1 >= kTriesForGood && std::isfinite(smallest.bits);
+    if (at_end || leapt_ || is_close || is_late) break;
   }
+  if (!std::isfinite(smallest.bits)) return {};
+  plan.step_m = smallest.step_m;
+  found_ = smallest.sum;
+  expected_bits_ = smallest.bits;
+  coded_ = std::move(smallest.coded);
   return {};
 }
 

@@ -21,7 +21,7 @@ using bench::digits;
 using bench::Json;
 
 constexpr std::size_t kFewestPoints = 50000;
-const std::vector<double> kSpacings{1, 2, 4};
+const std::vector<double> kSpacings{1, 2, 4}, kQuickSpacings{2};
 constexpr double kNearSpacings = 3;  // of a border: as far as a leaf there reaches that was cut
 
 /// Squared distances of points near a border between tiles, and of the others.
@@ -105,9 +105,10 @@ Status bench_seams(const BenchSettings& settings) {
     print(fmt::format("{} ({} points)", c->name, c->cloud.size()));
     print(fmt::format("{:>8} {:>8} {:>6} {:>8} {:>8} {:>7} {:>10} {:>10}", "RMS mm", "tile m", "tiles",
                       "bits", "got mm", "bits x", "forth near", "back near"));
-    for (const double r : kSpacings) {
+    const std::vector<double> sizes{2.01 * side, 0.0, side / 4, side / 8};
+    for (const double r : settings.quick ? kQuickSpacings : kSpacings) {
       std::optional<Cut> whole;
-      for (const double size : {2.01 * side, 0.0, side / 4, side / 8}) {
+      for (const double size : std::span(sizes).first(settings.quick ? 2 : sizes.size())) {
         const auto cut = measure(c->cloud, r * spacing, size, spacing, report.scratch());
         if (!cut.ok()) {
           report.note(c->name + ": " + cut.error().to_string());
