@@ -183,8 +183,6 @@ bool CompressJob::meets_rms_or_adjust() {
     plan.step_m *= 0.999 * promise / rms;
     return false;
   }
-  // The search has tried around it on the whole map.
-  if (plan.step_m == searched_step_ && rms <= promise) return true;
   if (coded_.surface_share() == 0 && options_.codecs == CodecChoice::cheapest) {
     // No tile took surfaces after all: one voxel side for the whole map is simpler, and its error known
     // beforehand.
@@ -192,6 +190,8 @@ bool CompressJob::meets_rms_or_adjust() {
     plan.step_m = position_step_;
     return false;
   }
+  // The search has tried around it on the whole map.
+  if (plan.step_m == searched_step_ && rms <= promise) return true;
   // A step of the map's size loses all it can; and colour may ask for finer steps than the positions.
   const bool can_be_coarser =
       plan.step_m < 4 * std::max(choice_.side_m, promise) && color_tries_ == 0 && rms_tries_ < 3;
