@@ -339,6 +339,8 @@ Status CompressJob::store_coded() {
   for (std::size_t i = 0; i < tiles_->tiles().size(); ++i)
     MAPCODEC_TRY(store(tiles_->tiles()[i].key, std::move(choice_.coded->tiles[i])));
   report_.tile_seconds = choice_.coded->seconds;
+  if (options_.progress)
+    options_.progress({"encode", survey_.points, survey_.points, report_.geometry_bytes});
   choice_.coded.reset();
   return {};
 }
