@@ -32,6 +32,9 @@ struct BenchSettings {
 /// Surfaces, points and the choice between them at promises around each cloud's spacing, and the surface
 /// codec's goals (surface.json, surface.md).
 [[nodiscard]] Status bench_surface(const BenchSettings& settings);
+/// What cutting into tiles costs: bits and RMS of the map in one tile, in tiles of the usual size and in
+/// smaller ones, near the borders and inside (seams.json, seams.md).
+[[nodiscard]] Status bench_seams(const BenchSettings& settings);
 /// The experiments of Morell et al. 2014 on our data (paper.json, paper.md, paper_*.png).
 [[nodiscard]] Status bench_paper(const BenchSettings& settings);
 

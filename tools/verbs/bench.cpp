@@ -23,6 +23,7 @@ int run(Arguments& a) {
                    : a.what == "formats" ? bench_formats(a.settings)
                    : a.what == "local"   ? bench_local(a.settings)
                    : a.what == "scaling" ? bench_scaling(a.settings)
+                   : a.what == "seams"   ? bench_seams(a.settings)
                    : a.what == "surface" ? bench_surface(a.settings)
                    : a.what == "update"  ? bench_update(a.settings)
                                          : bench_rate(a.settings);
@@ -36,9 +37,9 @@ int run(Arguments& a) {
 void add_bench(CLI::App& app, Action& action) {
   auto a = std::make_shared<Arguments>();
   CLI::App* verb = app.add_subcommand("bench", "Measurements on a folder of clouds: JSON, tables and plots");
-  verb->add_option("WHAT", a->what, "formats, local, paper, rate, scaling, surface or update")
+  verb->add_option("WHAT", a->what, "formats, local, paper, rate, scaling, seams, surface or update")
       ->required()
-      ->check(CLI::IsMember({"formats", "local", "paper", "rate", "scaling", "surface", "update"}));
+      ->check(CLI::IsMember({"formats", "local", "paper", "rate", "scaling", "seams", "surface", "update"}));
   verb->add_option("--data", a->settings.data, "Folder that is searched for clouds")->required();
   verb->add_option("-o,--output", a->settings.report, "Folder for the report")->required();
   verb->add_option("--threads", a->settings.threads, "0: all cores")->check(CLI::Range(0, 1024));
