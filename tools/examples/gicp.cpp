@@ -26,7 +26,7 @@ Result<Registration> run(const std::vector<Vec3>& scan, const LocalMapView& map,
   const std::vector<Vec3> thin = thinned(scan, settings.scan_voxel_m);
   const Eigen::Vector3d at = guess.translation();
   const Cloud::Ptr source = cloud_of(thin, {0, 0, 0});
-  const Cloud::Ptr target = cloud_of(map.cloud().xyz, {at[0], at[1], at[2]});
+  const Cloud::Ptr target = cloud_of(thinned(map.cloud().xyz, settings.map_voxel_m), {at[0], at[1], at[2]});
   if (source->size() < 20 || target->size() < 20)
     return make_error(ErrorCode::kEmpty, "too few points in the scan or around it");
   pcl::GeneralizedIterativeClosestPoint<pcl::PointXYZ, pcl::PointXYZ> gicp;

@@ -104,6 +104,8 @@ int main(int argc, char** argv) {
   app.add_option("--reach", a.registration.reach_m, "Largest error of the guess, about [m]");
   app.add_option("--voxel", a.registration.scan_voxel_m,
                  "Thin the scan to one point per voxel of this side [m]");
+  app.add_option("--map-voxel", a.registration.map_voxel_m, "The same for the map")
+      ->check(CLI::PositiveNumber);
   app.add_option("--unit", a.unit_m, "Metres per unit of the scan");
   app.add_option("--threads", a.threads, "0: all cores")->check(CLI::Range(0, 1024));
   try {

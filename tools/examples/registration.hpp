@@ -5,13 +5,14 @@
 #include <Eigen/Geometry>
 #include <vector>
 
-#include "slam_adapter/local_map.hpp"
+#include "tools/examples/surfels.hpp"
 
 namespace mapcodec::examples {
 
 struct RegistrationSettings {
   double reach_m = 1.0;  ///< largest error of the guess, about: how far partners are looked for at first
   double scan_voxel_m = 0.10;  ///< the scan is thinned to one point per voxel of this side; 0: not at all
+  double map_voxel_m = 0.10;   ///< as the map is, to voxel means: > 0
   int iterations = 100;        ///< most of them
   double step_m = 5e-5;        ///< ends when a step moves the scan by less than this ...
   double step_rad = 1e-5;      ///< ... and turns it by less
@@ -28,8 +29,8 @@ struct Registration {
 
 /// What a point is matched with.
 enum class Partner {
-  patches,  ///< surfaces as stored (LocalContent::patches): no map point is decoded for it
-  points,   ///< planes through the map points around it (LocalContent::points)
+  patches,  ///< planes through stored surfaces (LocalContent::patches): no map point is decoded for it
+  points,   ///< planes through the map's points (LocalContent::points)
 };
 
 /// Point-to-plane ICP [Chen & Medioni 1992] by Gauss-Newton with a Geman-McClure kernel whose width follows
@@ -49,9 +50,6 @@ enum class Partner {
                                                  const RegistrationSettings& settings = {});
 /// Whether register_gicp was built.
 [[nodiscard]] bool has_gicp();
-
-/// The mean of the points in each voxel, in the order in which voxels were first met.
-[[nodiscard]] std::vector<Vec3> thinned(const std::vector<Vec3>& points, double voxel_m);
 
 [[nodiscard]] MapPose to_pose(const Eigen::Isometry3d& t);
 /// [mm] between the origins, [mrad] of the rotation between them.
