@@ -16,6 +16,8 @@ constexpr double kNarrowest = 0.01;  // [m] of the kernel
 /// Partners are never looked for nearer than this many voxels of the map: its means lie that far apart.
 constexpr double kNearest = 1.5;
 constexpr std::size_t kFewest = 20;
+/// Once steps are this short [in units of the smallest that counts], the reach shrinks to this share.
+constexpr double kSettled = 40, kNarrower = 0.6;
 
 Vector3d eigen(const Vec3& p) {
   return {p[0], p[1], p[2]};
@@ -72,13 +74,12 @@ class PlaneIcp {
       const std::vector<Match> matches = match(scan, r.T_map_scan, reach);
       if (matches.size() < kFewest)
         return make_error(ErrorCode::kEmpty, "too few points of the scan meet the map");
-      const double sigma = spread(matches);
-      MAPCODEC_ASSIGN(const double moved, step(matches, std::max(kNarrowest, 3 * sigma), r));
-      // What lies far off by now has no partner.
+      // The kernel is as wide as the reach: what few points say about a direction counts until it fits.
+      MAPCODEC_ASSIGN(const double moved, step(matches, std::max(kNarrowest, 0.5 * reach), r));
       const double least = std::min(reach, kNearest * settings_.map_voxel_m);
-      const double next = std::clamp(6 * sigma, least, reach);
+      const double next = std::clamp(6 * spread(matches), least, reach);
       r.converged = moved < 1 && next > 0.95 * reach;
-      reach = std::max(next, 0.7 * reach);
+      if (moved < kSettled) reach = std::max(next, kNarrower * reach);
     }
     return r;
   }
