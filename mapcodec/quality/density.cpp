@@ -125,6 +125,21 @@ void add_all(std::span<const Vec3> points, const Grid& grid, std::int64_t change
   }
 }
 
+double difference_of_moved(std::span<const Vec3> original, std::span<const Vec3> decoded,
+                           std::span<const std::uint32_t> order, double voxel_m, double offset_m) {
+  const Grid grid(voxel_m, offset_m);
+  Differences differences(grid.cell(first_finite(original)));
+  for (std::size_t i = 0; i < decoded.size(); ++i) {
+    const Vec3& from = original[order[i]];
+    if (!is_finite(from) || !is_finite(decoded[i])) continue;
+    const Cell a = grid.cell(from), b = grid.cell(decoded[i]);
+    if (a == b) continue;
+    differences.add(a, -1);
+    differences.add(b, 1);
+  }
+  return differences.sum_of_magnitudes();
+}
+
 }  // namespace
 
 double density_difference(std::span<const Vec3> original, std::span<const Vec3> decoded, double voxel_m,
@@ -134,6 +149,17 @@ double density_difference(std::span<const Vec3> original, std::span<const Vec3> 
   add_all(original, grid, -1, differences);
   add_all(decoded, grid, 1, differences);
   return differences.sum_of_magnitudes();
+}
+
+double density_error_of_moved(std::span<const Vec3> original, std::span<const Vec3> decoded,
+                              std::span<const std::uint32_t> order, double voxel_m, int shifts) {
+  const auto n = static_cast<double>(count_finite(original));
+  if (n == 0) return std::numeric_limits<double>::quiet_NaN();
+  double sum = 0;
+  for (int s = 0; s < shifts; ++s) {
+    sum += difference_of_moved(original, decoded, order, voxel_m, voxel_m * s / shifts) / n / shifts;
+  }
+  return sum;
 }
 
 double density_error(std::span<const Vec3> original, std::span<const Vec3> decoded, double voxel_m,
