@@ -20,6 +20,12 @@ struct PendingCoding {
 /// Errors: Unsupported (a map by the paper's method).
 [[nodiscard]] Result<PendingCoding> pending_coding(const MapSchema& schema, Effort effort);
 
+/// What a pending segment of `points` decodes to, in another order: without coding it, and without the
+/// channels that novelty does not look at.
+/// @param schema  of the map.
+[[nodiscard]] PointCloud as_decoded(const PointCloud& points, const MapSchema& schema,
+                                    const PendingCoding& coding);
+
 /// A tile's content after folding.
 struct Fold {
   std::uint8_t codec = 0;  ///< first byte of `bytes`

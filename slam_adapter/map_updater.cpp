@@ -257,11 +257,9 @@ Status MapUpdater::State::work_on(TileWork& w) const {
   if (w.novelty.added.empty()) return {};
   const bool all = w.novelty.added.size() == w.points.size();
   const PointCloud some = all ? PointCloud{} : w.points.gather(w.novelty.added);
-  MAPCODEC_ASSIGN(EncodedTile t, encode_tile(all ? w.points : some, coding.schema, coding.tiles));
-  if (w.stored != nullptr) {
-    MAPCODEC_ASSIGN(const PointCloud decoded, decode_tile(t.bytes, schema));
-    w.stored->add(decoded, true);
-  }
+  const PointCloud& added = all ? w.points : some;
+  MAPCODEC_ASSIGN(EncodedTile t, encode_tile(added, coding.schema, coding.tiles));
+  if (w.stored != nullptr) w.stored->add(as_decoded(added, schema, coding), true);
   mark_pending(t.bytes);
   w.coded = std::move(t);
   return {};
