@@ -56,8 +56,9 @@ TEST(Density, EqualsTheDefinition) {
 }
 
 TEST(Density, OfMovedPointsIsTheSame) {
-  for (const double moved : {0.0, 0.02, 0.3}) {
-    const PointCloud a = random_cloud(4000, 3, {5e5, 4.9e6, 2300}, 1),
+  for (const double moved : {0.0, 0.02, 0.3, 1e9}) {
+    const double lattice = moved == 0.02 ? 0.025 : 0;  // then points lie on the faces of voxels
+    const PointCloud a = random_cloud(4000, 3, {5e5, 4.9e6, 2300}, 1, lattice),
                      by = random_cloud(4000, moved, {0, 0, 0}, 2);
     std::vector<Vec3> b;
     std::vector<std::uint32_t> order;
