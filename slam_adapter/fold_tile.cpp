@@ -34,12 +34,6 @@ MapSchema with_color_share(MapSchema schema, double share) {
   return schema;
 }
 
-/// Whether decoding all and encoding it again changes nothing that decodes.
-bool is_exact_again(MapSchema schema) {
-  return schema.promise == PromiseKind::lossless ||
-         (schema.promise == PromiseKind::max_error && bounded_color(schema) == nullptr);
-}
-
 /// Dropped channels are gone; encoders want them in their places all the same.
 PointCloud with_all_channels(PointCloud cloud, const MapSchema& schema) {
   std::vector<Channel> channels;
@@ -114,21 +108,6 @@ class TileForRms {
   std::optional<std::size_t> best_;
 };
 
-Result<EncodedTile> encode_for_good(const PointCloud& tile, const MapSchema& schema, bool with_pending) {
-  TileSettings s;
-  switch (schema.promise) {
-    case PromiseKind::lossless:
-      s.codec = CodecId::lossless;
-      return encode_tile(tile, schema, s);
-    case PromiseKind::rms: {
-      const MapSchema target = with_color_share(schema, with_pending ? kFoldedColor : 1);
-      return TileForRms(tile, target, (with_pending ? kFoldedShare : 1) * schema.promise_value).encode();
-    }
-    default:
-      return encode_tile(tile, with_color_share(schema, with_pending ? kFoldedColor : 1), s);
-  }
-}
-
 /// A tile's segments, sorted into what stays and what is coded again.
 struct Parts {
   std::vector<Bytes> kept;            ///< folded before, and erasures that concern them
@@ -159,13 +138,46 @@ struct Parts {
   }
 };
 
+}  // namespace
+
+bool has_bounded_color(const MapSchema& schema) {
+  MapSchema copy = schema;
+  return bounded_color(copy) != nullptr;
+}
+
+bool is_exact_again(const MapSchema& schema) {
+  return schema.promise == PromiseKind::lossless ||
+         (schema.promise == PromiseKind::max_error && !has_bounded_color(schema));
+}
+
+Result<EncodedTile> encode_for_good(PointCloud points, const MapSchema& schema, bool from_pending) {
+  const PointCloud tile = with_all_channels(std::move(points), schema);
+  TileSettings s;
+  switch (schema.promise) {
+    case PromiseKind::lossless:
+      s.codec = CodecId::lossless;
+      return encode_tile(tile, schema, s);
+    case PromiseKind::rms: {
+      const MapSchema target = with_color_share(schema, from_pending ? kFoldedColor : 1);
+      return TileForRms(tile, target, (from_pending ? kFoldedShare : 1) * schema.promise_value).encode();
+    }
+    default:
+      return encode_tile(tile, with_color_share(schema, from_pending ? kFoldedColor : 1), s);
+  }
+}
+
+Result<EncodedTile> encode_pending(PointCloud points, const MapSchema& schema, const PendingCoding& coding) {
+  MAPCODEC_ASSIGN(EncodedTile t,
+                  encode_tile(with_all_channels(std::move(points), schema), coding.schema, coding.tiles));
+  mark_pending(t.bytes);
+  return t;
+}
+
 TileErrors joint_errors(const TileErrors& tile, const TileErrors& again, double share) {
   return {std::sqrt(tile.rms_m * tile.rms_m + share * again.rms_m * again.rms_m),
           tile.max_axis_error_m + again.max_axis_error_m, tile.color_error + share * again.color_error,
           tile.density_error + share * again.density_error};
 }
-
-}  // namespace
 
 Result<PendingCoding> pending_coding(const MapSchema& schema, Effort effort) {
   PendingCoding p;
@@ -216,8 +228,7 @@ Result<std::optional<Fold>> fold_tile(const std::vector<Bytes>& segments, const 
   TileErrors again;
   double coded = 0;
   if (parts.pending && !parts.pending->empty()) {
-    const PointCloud cloud = with_all_channels(std::move(*parts.pending), schema);
-    MAPCODEC_ASSIGN(EncodedTile t, encode_for_good(cloud, schema, parts.any_pending));
+    MAPCODEC_ASSIGN(EncodedTile t, encode_for_good(std::move(*parts.pending), schema, parts.any_pending));
     fold.bounds.add(t.bounds);
     parts.kept.push_back(std::move(t.bytes));
     again = t.errors;

@@ -80,11 +80,12 @@ void forget_peak() {
   std::ofstream("/proc/self/clear_refs") << 5;
 }
 
-double peak_megabytes() {
+/// @param which  "VmHWM:" for the peak, "VmRSS:" for what is used now.
+double megabytes(const char* which) {
   std::ifstream status("/proc/self/status");
   for (std::string word; status >> word;) {
     double kilobytes = 0;
-    if (word == "VmHWM:" && status >> kilobytes) return kilobytes / 1024;
+    if (word == which && status >> kilobytes) return kilobytes / 1024;
   }
   return 0;
 }
@@ -92,8 +93,8 @@ double peak_megabytes() {
 struct Ingest {
   double points_per_second = 0;
   double points_per_processor_second = 0;  ///< of the whole process: other programs do not stretch it
-  double peak_mb = 0;
-  std::vector<double> commits;  ///< [s] from the scan to its revision on the disk
+  double peak_mb = 0, before_mb = 0;       ///< before: the scans, which wait in memory, and the program
+  std::vector<double> commits;             ///< [s] from the scan to its revision on the disk
   std::uint64_t added = 0, bytes = 0;
 };
 
@@ -104,6 +105,7 @@ Result<Ingest> ingest(MapUpdater& map, const PointCloud& scan, int scans, double
   std::vector<PointCloud> all;
   for (int i = 0; i < scans; ++i) all.push_back(scan_at(scan, 0.5 * kStride * i, unsigned(100000 + i)));
   forget_peak();
+  r.before_mb = megabytes("VmRSS:");
   const Watch watch(Watch::Kind::wall), work(Watch::Kind::whole_process);
   for (PointCloud& c : all) {
     const double early = period_s * double(r.commits.size()) - watch.seconds();
@@ -118,19 +120,20 @@ Result<Ingest> ingest(MapUpdater& map, const PointCloud& scan, int scans, double
   }
   r.points_per_second = double(points) / watch.seconds();
   r.points_per_processor_second = double(points) / work.seconds();
-  r.peak_mb = peak_megabytes();
+  r.peak_mb = megabytes("VmHWM:");
   return r;
 }
 
 void report_ingest(Report& report, const std::string& name, const Ingest& r, double reader, double solo) {
   report.row({name, digits(r.points_per_second / 1e6), digits(r.points_per_processor_second / 1e6),
-              digits(r.peak_mb), digits(1e3 * quantile(r.commits, 0.5)),
+              digits(r.peak_mb), digits(r.before_mb), digits(1e3 * quantile(r.commits, 0.5)),
               digits(1e3 * quantile(r.commits, 0.99)), digits(reader / 1e6),
               digits(solo > 0 ? reader / solo : 0)});
   report.json()["ingest"].push_back(Json{{"name", name},
                                          {"points_per_second", r.points_per_second},
                                          {"points_per_processor_second", r.points_per_processor_second},
                                          {"peak_mb", r.peak_mb},
+                                         {"before_mb", r.before_mb},
                                          {"commit_p50_s", quantile(r.commits, 0.5)},
                                          {"commit_p99_s", quantile(r.commits, 0.99)},
                                          {"points_added", r.added},
@@ -165,8 +168,8 @@ Status measure_ingest(const BenchSettings& settings, Report& report) {
       fmt::format("\n## Scans of {} points into a map of {} million\n", scan.size(), size / 1'000'000));
   report.line(fmt::format("Budget of the updater: {} MB for what it knows of tiles, {} points in a batch.\n",
                           update.cache_bytes >> 20, update.batch_points));
-  report.table({"", "M points/s", "per processor s", "peak MB", "commit ms p50", "p99", "reader M points/s",
-                "of alone"});
+  report.table({"", "M points/s", "per processor s", "peak MB", "MB before", "commit ms p50", "p99",
+                "reader M points/s", "of alone"});
   const int scans = settings.quick ? 30 : 150;
   update.density_cap = true;
   for (const bool with_reader : {false, true}) {
