@@ -11,6 +11,7 @@
 #include "slam_adapter/fold_tile.hpp"
 #include "slam_adapter/level_errors.hpp"
 #include "slam_adapter/point_batch.hpp"
+#include "slam_adapter/split_tile.hpp"
 #include "slam_adapter/tile_directory.hpp"
 
 namespace mapcodec {
@@ -145,6 +146,8 @@ struct MapUpdater::State {
   Result<Erasure> in_submap(const Erasure& e, std::uint32_t submap) const;
   Status fold(std::size_t least);
   Status fold_some(const std::vector<Place>& places);
+  Status split_large(std::vector<Place> places);
+  Result<std::vector<Place>> split_one(const Place& place);
   Status stopped() const {
     return settings.stop != nullptr && *settings.stop ? Status(make_error(ErrorCode::kCancelled, "stopped"))
                                                       : Status{};
@@ -157,7 +160,9 @@ Status MapUpdater::State::begin() {
   achieved = writer.info().achieved;
   input_points = writer.info().input_points;
   input_bytes = writer.info().input_bytes;
-  new_level = usual_level(writer.tiles());
+  const auto level = writer.info().extras.find(kNewTileLevelExtra);
+  const bool has_level = level != writer.info().extras.end() && level->second.size() == 1;
+  new_level = has_level ? std::min(level->second[0], kMaxTileLevel) : usual_level(writer.tiles());
   for (const TileRecord* t : writer.tiles()) {
     directory(t->submap).add(t->key);
     stored_points += t->points;
@@ -260,14 +265,12 @@ Status MapUpdater::State::work_on(TileWork& w) const {
   const bool all = w.novelty.added.size() == w.points.size();
   const PointCloud some = all ? PointCloud{} : w.points.gather(w.novelty.added);
   if (settings.for_good && w.begins) {
-    MAPCODEC_ASSIGN(w.coded, encode_for_good(w.points, schema));
+    MAPCODEC_ASSIGN(w.coded, encode_for_good(w.points, schema, false));
     return {};
   }
-  MAPCODEC_ASSIGN(EncodedTile t, encode_tile(all ? w.points : some, coding.schema, coding.tiles));
-  if (w.stored != nullptr) {
-    MAPCODEC_ASSIGN(const PointCloud decoded, decode_tile(t.bytes, schema));
-    w.stored->add(decoded, true);
-  }
+  const PointCloud& added = all ? w.points : some;
+  MAPCODEC_ASSIGN(EncodedTile t, encode_tile(added, coding.schema, coding.tiles));
+  if (w.stored != nullptr) w.stored->add(as_decoded(added, schema, coding), true);
   mark_pending(t.bytes);
   w.coded = std::move(t);
   return {};
@@ -335,9 +338,49 @@ Status MapUpdater::State::flush() {
   }
   MAPCODEC_TRY(stopped());
   MAPCODEC_TRY(run_all(work.size(), [&](std::size_t i) { return work_on(work[i]); }));
-  for (TileWork& w : work) MAPCODEC_TRY(store(w));
+  std::vector<Place> touched;
+  for (TileWork& w : work) {
+    MAPCODEC_TRY(store(w));
+    touched.push_back(w.place);
+  }
+  MAPCODEC_TRY(split_large(std::move(touched)));
   trim_cache();
   return stopped();
+}
+
+/// Tiles that grew far beyond the others, and then their parts.
+Status MapUpdater::State::split_large(std::vector<Place> places) {
+  while (!places.empty()) {
+    const Place place = places.back();
+    places.pop_back();
+    const TileRecord* record = writer.find(place.key, place.submap);
+    if (record == nullptr || record->points <= settings.split_points || place.key.level == 0) continue;
+    MAPCODEC_TRY(stopped());
+    MAPCODEC_ASSIGN(const std::vector<Place> parts, split_one(place));
+    places.insert(places.end(), parts.begin(), parts.end());
+  }
+  return {};
+}
+
+Result<std::vector<Place>> MapUpdater::State::split_one(const Place& place) {
+  const TileRecord record = *writer.find(place.key, place.submap);
+  MAPCODEC_ASSIGN(const std::vector<Bytes> segments, read_all(record));
+  MAPCODEC_ASSIGN(const auto parts, split_tile(place.key, segments, schema, coding, record.errors));
+  std::vector<Place> places;
+  if (!parts) return places;
+  cache.erase(place);
+  ++report.tiles_split;
+  MAPCODEC_TRY(writer.remove(place.key, place.submap));
+  TileDirectory& tiles_of = directory(place.submap);
+  tiles_of.split(place.key);
+  for (const TilePart& part : *parts) {
+    tiles_of.add(part.key);
+    report.bytes += part.tile.bytes.size();
+    places.push_back({place.submap, part.key});
+    MAPCODEC_TRY(writer.add(part.key, part.tile.codec, part.tile.points, part.tile.bounds, part.tile.errors,
+                            part.tile.bytes, place.submap));
+  }
+  return places;
 }
 
 Result<Erasure> MapUpdater::State::in_submap(const Erasure& e, std::uint32_t submap) const {
@@ -542,7 +585,8 @@ void MapUpdater::add_input_bytes(std::uint64_t bytes) {
 }
 
 Status MapUpdater::flush() {
-  return state_->flush();
+  MAPCODEC_TRY(state_->failed);
+  return state_->remember(state_->flush());
 }
 
 Status MapUpdater::fold(std::size_t least) {

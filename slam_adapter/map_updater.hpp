@@ -26,7 +26,10 @@ struct UpdateSettings {
   /// What begins a tile is coded once, with the whole promise, instead of quickly and pending: for points to
   /// which nothing will be added, as those of a keyframe.
   bool for_good = false;
-  std::size_t fold_after = 24;  ///< pending segments of a tile at which the next commit folds it; 0: never
+  std::size_t fold_after = 24;   ///< pending segments of a tile at which the next commit folds it; 0: never
+  /// A tile of more points becomes up to eight smaller ones, where the map has smaller ones and no point
+  /// would be coded with loss more than twice.
+  std::uint64_t split_points = std::uint64_t{1} << 20;
   std::uint64_t cache_bytes = std::uint64_t{512} << 20;  ///< for what is known of tiles between insertions
   std::uint64_t batch_points = std::uint64_t{1} << 21;   ///< are coded together; more are held at no time
   const std::atomic<bool>* stop = nullptr;
@@ -39,7 +42,7 @@ struct UpdateReport {
   std::uint64_t points_added = 0;
   std::uint64_t points_known = 0;    ///< that stored ones stand for
   std::uint64_t dropped_points = 0;  ///< not finite
-  std::uint64_t tiles_touched = 0, tiles_new = 0, tiles_folded = 0, tiles_removed = 0;
+  std::uint64_t tiles_touched = 0, tiles_new = 0, tiles_folded = 0, tiles_removed = 0, tiles_split = 0;
   std::uint64_t bytes = 0;  ///< of new segments
 };
 

@@ -48,7 +48,10 @@ Result<Geometry> encode_points_geometry(const PointCloud& tile, const MapSchema&
   // nearest original than from its own: so the larger direction is this one, and no search is needed.
   g.errors.rms_m = std::sqrt(e.sum_squared_error / static_cast<double>(tile.size()));
   g.errors.max_axis_error_m = e.max_axis_error_m;
-  if (!settings.rough_errors) g.errors.density_error = density_error(tile.xyz, g.decoded);
+  if (settings.rough_errors) return g;
+  const bool all_kept = g.order.size() == tile.size();
+  g.errors.density_error =
+      all_kept ? density_error_of_moved(tile.xyz, g.decoded, g.order) : density_error(tile.xyz, g.decoded);
   return g;
 }
 

@@ -54,11 +54,10 @@ Result<MapPose> register_scan(const PointCloud& scan, const LocalMapView& view, 
   }
   const double voxel = voxel_m > 0 ? voxel_m : usual_voxel(finite);
   examples::RegistrationSettings settings;
-  settings.scan_voxel_m = voxel;
+  settings.scan_voxel_m = settings.map_voxel_m = voxel;
   settings.reach_m = reach_m > 0 ? reach_m : 10 * voxel;
-  const std::vector<Vec3> target = examples::thinned(view.cloud().xyz, voxel);
   MAPCODEC_ASSIGN(const auto found,
-                  examples::register_gicp(finite, target, examples::to_isometry(guess), settings));
+                  examples::register_gicp(finite, view, examples::to_isometry(guess), settings));
   return examples::to_pose(found.T_map_scan);
 }
 
