@@ -11,10 +11,11 @@
 #include <mrpt/obs/CObservation2DRangeScan.h>
 #include <mrpt/obs/CObservationOdometry.h>
 #include <mrpt/obs/CObservationRobotPose.h>
-#include <mrpt/obs/CRawlog.h>
+#include <mrpt/obs/CSensoryFrame.h>
 #include <mrpt/obs/registerAllClasses.h>
 #include <mrpt/poses/registerAllClasses.h>
 
+#include <filesystem>
 #include <map>
 
 #include "slam_adapter/mrpt/mrpt_pose.hpp"
@@ -280,7 +281,7 @@ class LogReader {
     } catch (const std::bad_alloc&) {
       throw;
     } catch (const std::exception& e) {  // as where an image beside the log is missing
-      why = "MRPT cannot project it: " + first_line(e.what());
+      why = "MRPT cannot project it: " + message_of(e.what());
     }
     count(name, why);
     return why.empty() ? emit_(std::move(f)) : Status{};
@@ -323,7 +324,11 @@ class LogReader {
     return cloud_of(points);
   }
 
-  static std::string first_line(std::string text) {
+  /// MRPT's exceptions are several lines; one says what is wrong.
+  static std::string message_of(std::string text) {
+    const std::string_view mark = "Message:";
+    if (const std::size_t at = text.find(mark); at != std::string::npos) text.erase(0, at + mark.size());
+    text.erase(0, text.find_first_not_of(" \t"));
     const std::size_t end = text.find_first_of("\n\r");
     if (end != std::string::npos) text.resize(end);
     return text.substr(0, 300);
@@ -366,6 +371,17 @@ Error explained(const ObjectArchive& in, const std::string& object, const std::s
   return make_error(ErrorCode::kMalformed, "MRPT cannot read a " + object, in.position());
 }
 
+/// Images beside a log lie in NAME_Images or Images. MRPT 2.5.8 looks for them in the wrong place where the log's
+/// path has a folder.
+std::string images_folder(const std::string& path) {
+  namespace fs = std::filesystem;
+  fs::path name = fs::path(path).filename();
+  if (name.extension() == ".gz") name = name.stem();
+  const fs::path folder = fs::path(path).parent_path(), own = folder / (name.stem().string() + "_Images");
+  std::error_code ignored;
+  return (fs::is_directory(own, ignored) ? own : folder / "Images").string();
+}
+
 void register_classes() {
   mrpt::poses::registerAllClasses_mrpt_poses();
   mrpt::obs::registerAllClasses_mrpt_obs();
@@ -378,7 +394,7 @@ Result<RawlogSummary> read_log(const std::string& path, const LogSettings& setti
                                const std::function<Status(RawlogFrame&&)>& emit) {
   MAPCODEC_ASSIGN(const std::unique_ptr<ObjectArchive> in, ObjectArchive::open(path));
   register_classes();
-  mrpt::img::CImage::setImagesPathBase(CRawlog::detectImagesDirectory(path));
+  mrpt::img::CImage::setImagesPathBase(images_folder(path));
   LogReader reader(*in, settings, emit);
   try {
     MAPCODEC_TRY(reader.run());
