@@ -18,6 +18,7 @@
 #include <filesystem>
 #include <map>
 
+#include "maps/submap_pose.hpp"
 #include "slam_adapter/mrpt/mrpt_pose.hpp"
 #include "slam_adapter/mrpt/object_archive.hpp"
 #include "slam_adapter/mrpt/observation_points.hpp"
@@ -254,7 +255,7 @@ class LogReader {
       return {};
     }
     if (!settings_.sensors.empty() && !settings_.sensors.contains(o.sensorLabel)) {
-      count(name + " of '" + o.sensorLabel + "'", "not asked for");
+      count(name + " of '" + o.sensorLabel.substr(0, kLongestLabel) + "'", "not asked for");
       return {};
     }
     if (matcher_ && dynamic_cast<const CObservation2DRangeScan*>(&o) != nullptr) pose_ = matcher_->match(o);
@@ -262,13 +263,20 @@ class LogReader {
     return emit_points(o, name, number);
   }
 
+  /// Of a pose that is one: numbers in a file may be anything.
+  static std::optional<MapPose> sound(const std::optional<CPose3D>& p) {
+    if (!p) return std::nullopt;
+    const MapPose pose = pose_of(*p);
+    return check_pose(pose.translation_m, pose.rotation_xyzw).ok() ? std::optional(pose) : std::nullopt;
+  }
+
   RawlogFrame frame_of(const std::string& name, std::uint64_t number) const {
     RawlogFrame f;
     f.number = number;
     f.group = group_;
     f.class_name = name;
-    if (odometry_) f.T_odom_vehicle = pose_of(*odometry_);
-    if (pose_) f.T_map_vehicle = pose_of(*pose_);
+    f.T_odom_vehicle = sound(odometry_);
+    f.T_map_vehicle = sound(pose_);
     f.file_offset = in_.file_offset();
     return f;
   }
@@ -283,6 +291,8 @@ class LogReader {
     } catch (const std::exception& e) {  // as where an image beside the log is missing
       why = "MRPT cannot project it: " + message_of(e.what());
     }
+    if (why.empty() && !check_pose(f.T_vehicle_sensor.translation_m, f.T_vehicle_sensor.rotation_xyzw).ok())
+      why = "its sensor's pose is none";
     count(name, why);
     return why.empty() ? emit_(std::move(f)) : Status{};
   }
@@ -290,7 +300,7 @@ class LogReader {
   Status emit_pose(const CObservation& o) {
     if (!settings_.list) return {};
     RawlogFrame f = frame_of(bare(o.GetRuntimeClass()->className), number_);
-    f.sensor = o.sensorLabel;
+    f.sensor = o.sensorLabel.substr(0, kLongestLabel);
     if (o.timestamp != INVALID_TIMESTAMP) f.stamp_s = mrpt::Clock::toDouble(o.timestamp);
     return emit_(std::move(f));
   }
