@@ -120,9 +120,11 @@ Result<LogSurvey> survey_log(const std::string& path, const RawlogOptions& optio
   s.file_bytes = reader.file_bytes();
   Surveyor surveyor(s);
   for (;;) {
-    MAPCODEC_ASSIGN(const auto frame, reader.next());
-    if (!frame) break;
-    surveyor.take(*frame);
+    const auto frame = reader.next();
+    if (!frame.ok() && s.frames == 0) return frame.error();
+    if (!frame.ok()) s.damage = frame.error();
+    if (!frame.ok() || !*frame) break;
+    surveyor.take(**frame);
   }
   surveyor.finish();
   s.summary = reader.summary();

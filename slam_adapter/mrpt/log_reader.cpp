@@ -11,12 +11,14 @@
 #include <mrpt/obs/CObservation2DRangeScan.h>
 #include <mrpt/obs/CObservationOdometry.h>
 #include <mrpt/obs/CObservationRobotPose.h>
-#include <mrpt/obs/CRawlog.h>
+#include <mrpt/obs/CSensoryFrame.h>
 #include <mrpt/obs/registerAllClasses.h>
 #include <mrpt/poses/registerAllClasses.h>
 
+#include <filesystem>
 #include <map>
 
+#include "maps/submap_pose.hpp"
 #include "slam_adapter/mrpt/mrpt_pose.hpp"
 #include "slam_adapter/mrpt/object_archive.hpp"
 #include "slam_adapter/mrpt/observation_points.hpp"
@@ -253,7 +255,7 @@ class LogReader {
       return {};
     }
     if (!settings_.sensors.empty() && !settings_.sensors.contains(o.sensorLabel)) {
-      count(name + " of '" + o.sensorLabel + "'", "not asked for");
+      count(name + " of '" + o.sensorLabel.substr(0, kLongestLabel) + "'", "not asked for");
       return {};
     }
     if (matcher_ && dynamic_cast<const CObservation2DRangeScan*>(&o) != nullptr) pose_ = matcher_->match(o);
@@ -261,13 +263,20 @@ class LogReader {
     return emit_points(o, name, number);
   }
 
+  /// Of a pose that is one: numbers in a file may be anything.
+  static std::optional<MapPose> sound(const std::optional<CPose3D>& p) {
+    if (!p) return std::nullopt;
+    const MapPose pose = pose_of(*p);
+    return check_pose(pose.translation_m, pose.rotation_xyzw).ok() ? std::optional(pose) : std::nullopt;
+  }
+
   RawlogFrame frame_of(const std::string& name, std::uint64_t number) const {
     RawlogFrame f;
     f.number = number;
     f.group = group_;
     f.class_name = name;
-    if (odometry_) f.T_odom_vehicle = pose_of(*odometry_);
-    if (pose_) f.T_map_vehicle = pose_of(*pose_);
+    f.T_odom_vehicle = sound(odometry_);
+    f.T_map_vehicle = sound(pose_);
     f.file_offset = in_.file_offset();
     return f;
   }
@@ -280,8 +289,10 @@ class LogReader {
     } catch (const std::bad_alloc&) {
       throw;
     } catch (const std::exception& e) {  // as where an image beside the log is missing
-      why = "MRPT cannot project it: " + first_line(e.what());
+      why = "MRPT cannot project it: " + message_of(e.what());
     }
+    if (why.empty() && !check_pose(f.T_vehicle_sensor.translation_m, f.T_vehicle_sensor.rotation_xyzw).ok())
+      why = "its sensor's pose is none";
     count(name, why);
     return why.empty() ? emit_(std::move(f)) : Status{};
   }
@@ -289,7 +300,7 @@ class LogReader {
   Status emit_pose(const CObservation& o) {
     if (!settings_.list) return {};
     RawlogFrame f = frame_of(bare(o.GetRuntimeClass()->className), number_);
-    f.sensor = o.sensorLabel;
+    f.sensor = o.sensorLabel.substr(0, kLongestLabel);
     if (o.timestamp != INVALID_TIMESTAMP) f.stamp_s = mrpt::Clock::toDouble(o.timestamp);
     return emit_(std::move(f));
   }
@@ -323,7 +334,11 @@ class LogReader {
     return cloud_of(points);
   }
 
-  static std::string first_line(std::string text) {
+  /// MRPT's exceptions are several lines; one says what is wrong.
+  static std::string message_of(std::string text) {
+    const std::string_view mark = "Message:";
+    if (const std::size_t at = text.find(mark); at != std::string::npos) text.erase(0, at + mark.size());
+    text.erase(0, text.find_first_not_of(" \t"));
     const std::size_t end = text.find_first_of("\n\r");
     if (end != std::string::npos) text.resize(end);
     return text.substr(0, 300);
@@ -366,6 +381,17 @@ Error explained(const ObjectArchive& in, const std::string& object, const std::s
   return make_error(ErrorCode::kMalformed, "MRPT cannot read a " + object, in.position());
 }
 
+/// Images beside a log lie in NAME_Images or Images. MRPT 2.5.8 looks for them in the wrong place where the log's
+/// path has a folder.
+std::string images_folder(const std::string& path) {
+  namespace fs = std::filesystem;
+  fs::path name = fs::path(path).filename();
+  if (name.extension() == ".gz") name = name.stem();
+  const fs::path folder = fs::path(path).parent_path(), own = folder / (name.stem().string() + "_Images");
+  std::error_code ignored;
+  return (fs::is_directory(own, ignored) ? own : folder / "Images").string();
+}
+
 void register_classes() {
   mrpt::poses::registerAllClasses_mrpt_poses();
   mrpt::obs::registerAllClasses_mrpt_obs();
@@ -378,7 +404,7 @@ Result<RawlogSummary> read_log(const std::string& path, const LogSettings& setti
                                const std::function<Status(RawlogFrame&&)>& emit) {
   MAPCODEC_ASSIGN(const std::unique_ptr<ObjectArchive> in, ObjectArchive::open(path));
   register_classes();
-  mrpt::img::CImage::setImagesPathBase(CRawlog::detectImagesDirectory(path));
+  mrpt::img::CImage::setImagesPathBase(images_folder(path));
   LogReader reader(*in, settings, emit);
   try {
     MAPCODEC_TRY(reader.run());

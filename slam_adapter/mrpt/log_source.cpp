@@ -36,14 +36,19 @@ class LogSource final : public PointSource {
     const std::size_t end = std::min(frame_.size(), at_ + kBlock);
     block.append(frame_, at_, end);
     at_ = end;
-    return !block.empty();
+    points_ += block.size();
+    if (points_ > 0 || dropped_ > 0) return !block.empty();
+    std::string why;
+    for (const std::string& s : unused_classes(reader_->summary())) why += (why.empty() ? ": " : ", ") + s;
+    failed_ = named(path_, make_error(ErrorCode::kEmpty, "none of its observations gives a point" + why));
+    return failed_.error();
   }
 
   Status rewind() override {
     reader_.reset();
     frame_ = layout_.like();
     at_ = 0;
-    dropped_ = without_pose_ = 0;
+    points_ = dropped_ = without_pose_ = 0;
     failed_ = {};
     ended_ = false;
     return {};
@@ -109,7 +114,7 @@ class LogSource final : public PointSource {
   std::size_t at_ = 0;
   std::optional<RawlogReader> reader_;
   LogPoses poses_ = LogPoses::best_of({});
-  std::uint64_t dropped_ = 0, without_pose_ = 0;
+  std::uint64_t points_ = 0, dropped_ = 0, without_pose_ = 0;
   Status failed_;
   bool ended_ = false;
 };
@@ -118,6 +123,7 @@ class LogSource final : public PointSource {
 
 Result<std::unique_ptr<PointSource>> open_log(const std::string& path, const ReadOptions& options) {
   MAPCODEC_ASSIGN(LogSurvey survey, survey_log(path, {}));
+  if (survey.damage) return *survey.damage;
   auto source = std::make_unique<LogSource>(path, std::move(survey), options);
   MAPCODEC_TRY(source->rewind());
   return std::unique_ptr<PointSource>(std::move(source));

@@ -61,9 +61,9 @@ void ObjectArchive::fill() {
   const int got = gzread(gz(file_), buffer_.data() + had, static_cast<unsigned>(kBuffer));
   buffer_.resize(had + static_cast<std::size_t>(std::max(0, got)));
   int code = Z_OK;
-  const char* message = gzerror(gz(file_), &code);
+  (void)gzerror(gz(file_), &code);
   if (got < 0 || (code != Z_OK && code != Z_STREAM_END)) {
-    unpacking_error_ = code == Z_BUF_ERROR ? "the zipped stream breaks off" : message;
+    unpacking_error_ = code == Z_BUF_ERROR ? "the zipped stream breaks off" : "the zipped stream is damaged";
   }
   ended_ = got < static_cast<int>(kBuffer);
 }

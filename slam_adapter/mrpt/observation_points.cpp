@@ -150,7 +150,7 @@ std::string rotating(const CObservationRotatingScan& o, const ProjectionSettings
   const std::vector<double> elevation = elevations(o);
   if (rows == 0 || columns == 0) return "no ranges";
   if (std::size_t(rows) > elevation.size())
-    return "the elevation of its rings is not known (scanner '" + o.lidarModel + "')";
+    return "the elevation of its rings is not known (scanner '" + o.lidarModel.substr(0, kLongestLabel) + "')";
   const bool shines = o.intensityImage.rows() == rows && o.intensityImage.cols() == columns;
   if (shines) add_layout(f.points, kIntensity);
   add_layout(f.points, kRing);
@@ -216,7 +216,7 @@ bool gives_points(const CObservation& o) {
 }
 
 std::string take_points(CObservation& o, const ProjectionSettings& settings, RawlogFrame& f) {
-  f.sensor = o.sensorLabel;
+  f.sensor = o.sensorLabel.substr(0, kLongestLabel);
   if (o.timestamp != INVALID_TIMESTAMP) f.stamp_s = mrpt::Clock::toDouble(o.timestamp);
   mrpt::poses::CPose3D T_vehicle_sensor;
   o.getSensorPose(T_vehicle_sensor);

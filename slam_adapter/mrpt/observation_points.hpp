@@ -11,6 +11,8 @@
 
 namespace mapcodec {
 
+inline constexpr std::size_t kLongestLabel = 255;  ///< of a sensor; longer ones are cut
+
 struct ProjectionSettings {
   std::uint8_t decimation = 1;  ///< of range images: one point of each block of this many pixels squared
   bool layout_alone = false;    ///< no points, only their channels: nothing is projected or loaded

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """MRPT's files through the program, beside what MRPT itself makes of them. Files: what make_mrpt_logs writes, and
 those of Debian's mrpt-common where it is installed."""
+import gzip
 import json
 import math
 import os
@@ -37,7 +38,7 @@ class Mrpt(unittest.TestCase):
     def setUpClass(cls):
         cls.folder = Path(tempfile.mkdtemp(prefix="mapcodec_mrpt_"))
         cls.logs = cls.folder / "logs"
-        subprocess.run([MAKE, str(cls.logs)], check=True, timeout=120)
+        subprocess.run([MAKE, str(cls.logs)], check=True, timeout=120, stdout=subprocess.DEVNULL)
 
     @classmethod
     def tearDownClass(cls):
@@ -196,7 +197,8 @@ class Mrpt(unittest.TestCase):
                 p.stderr.close()
                 kills += 1
                 run("verify", parts)
-            self.assertEqual(p.wait(), 0, p.stderr.read())
+            said = p.stderr.read().decode()  # the last kill may have come after the last commit
+            self.assertTrue(p.wait() == 0 or "complete already" in said, said)
             p.stderr.close()
             self.assertGreater(kills, 0)
             self.assertEqual(self.points(parts, "a.xyz"), self.points(whole, "b.xyz"))
@@ -207,10 +209,14 @@ class Mrpt(unittest.TestCase):
 
     def test_a_cut_log_keeps_what_came_before(self):
         plain = self.path("plain.rawlog")
-        data = subprocess.run(["gzip", "-dc"], stdin=open(self.logs / "depth.rawlog", "rb"), capture_output=True).stdout
-        plain.write_bytes(data[: len(data) * 5 // 8])
+        data = gzip.decompress((self.logs / "depth.rawlog").read_bytes())
+        plain.write_bytes(data[: len(data) * 11 // 16])
         line = run("rawlog", plain, "-o", self.path("cut.mapc"), "--max-error", "0.01", "--poses", "odometry", code=3)
         self.assertIn("ends within", line)
+        self.assertIn("5 keyframes before it are in the map", line)
+        run("verify", self.path("cut.mapc"))
+        self.assertEqual(json.loads(run("info", self.path("cut.mapc"), "--json"))["points"], 5 * 120 * 90)
+        run("compress", plain, "-o", self.path("cut2.mapc"), "--max-error", "0.01", code=3)
 
     def test_damaged_logs_and_simplemaps(self):
         """Cut and flipped: an error of one line, or a map; never a crash."""

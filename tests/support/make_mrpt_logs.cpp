@@ -2,6 +2,7 @@
 // Writes small files of MRPT's into a folder: a robot in a room of boxes, seen by several kinds of sensors.
 //   make_mrpt_logs FOLDER
 #include <mrpt/io/CFileGZOutputStream.h>
+#include <mrpt/io/CFileOutputStream.h>
 #include <mrpt/maps/CColouredPointsMap.h>
 #include <mrpt/maps/CMultiMetricMap.h>
 #include <mrpt/maps/COctoMap.h>
@@ -149,11 +150,18 @@ class Folder {
   [[nodiscard]] std::string operator/(const std::string& name) const { return path_ + "/" + name; }
 
   template <class F>
-  void write(const std::string& name, F&& content, int compression = 6) const {
-    mrpt::io::CFileGZOutputStream file;
-    file.open(*this / name, compression);
-    auto out = mrpt::serialization::archiveFrom(file);
-    content(out);
+  void write(const std::string& name, F&& content, bool zipped = true) const {
+    mrpt::io::CFileGZOutputStream zip;
+    mrpt::io::CFileOutputStream plain;
+    if (zipped) {
+      zip.open(*this / name);
+      auto out = mrpt::serialization::archiveFrom(zip);
+      content(out);
+    } else {
+      plain.open(*this / name);
+      auto out = mrpt::serialization::archiveFrom(plain);
+      content(out);
+    }
   }
   void object(const std::string& name, const mrpt::serialization::CSerializable& o) const {
     write(name, [&](auto& out) { out << o; });
@@ -216,7 +224,7 @@ void flat_logs(const Folder& f) {
           out << actions << frame;
         }
       },
-      0);
+      false);
 }
 
 /// A class that MRPT does not know, alone and within a sensory frame: a known one under another name.
@@ -231,7 +239,7 @@ void unknown_log(const Folder& f) {
           out << *odometry(i) << CObservationGPS() << frame;
         }
       },
-      0);
+      false);
   std::ifstream in(f / "unknown.rawlog", std::ios::binary);
   std::string bytes{std::istreambuf_iterator<char>(in), {}};
   in.close();
@@ -308,19 +316,19 @@ void seeds(const std::string& path) {
   CActionCollection actions;
   actions.insert(move);
   logs.write(
-      "frames.rawlog", [&](auto& out) { out << actions << frame << actions << frame; }, 0);
+      "frames.rawlog", [&](auto& out) { out << actions << frame << actions << frame; }, false);
   logs.write(
-      "depth.rawlog", [](auto& out) { out << *odometry(1) << *depth_image(1, pose_at(1), 15); }, 0);
+      "depth.rawlog", [](auto& out) { out << *odometry(1) << *depth_image(1, pose_at(1), 15); }, false);
   auto cloud = CObservationPointCloud::Create();
   auto points = mrpt::maps::CColouredPointsMap::Create();
   for (int i = 0; i < 10; ++i) points->insertPointRGB(float(i), 1, 2, 0.1F, 0.2F, 0.3F);
   cloud->pointcloud = points;
   logs.write(
-      "cloud.rawlog", [&](auto& out) { out << *cloud << *robot_pose(1); }, 0);
+      "cloud.rawlog", [&](auto& out) { out << *cloud << *robot_pose(1); }, false);
   CObservationRotatingScan rotating;
   rotating.fromScan2D(*flat_scan(1, pose_at(1), "laser", 21));
   logs.write(
-      "rotating.rawlog", [&](auto& out) { out << rotating; }, 0);
+      "rotating.rawlog", [&](auto& out) { out << rotating; }, false);
   CObservationVelodyneScan velodyne;
   velodyne.scan_packets.resize(1);
   velodyne.calibration = VelodyneCalibration::LoadDefaultCalibration("VLP16");
@@ -330,7 +338,7 @@ void seeds(const std::string& path) {
   for (std::size_t block = 0; block < 12; ++block) std::memcpy(packet + 100 * block, "\xff\xee\x10\x10", 4);
   std::memcpy(packet + 1204, "\x37\x22", 2);
   logs.write(
-      "velodyne.rawlog", [&](auto& out) { out << velodyne; }, 0);
+      "velodyne.rawlog", [&](auto& out) { out << velodyne; }, false);
   keyframes_folder.write(
       "keyframes.simplemap",
       [&](auto& out) {
@@ -342,7 +350,7 @@ void seeds(const std::string& path) {
         map.insert(pose, other);
         out << map;
       },
-      0);
+      false);
   for (const char* name : {"localization_demo.simplemap.gz"}) {
     const auto shipped = std::filesystem::path("/usr/share/mrpt/datasets") / name;
     if (std::filesystem::exists(shipped))

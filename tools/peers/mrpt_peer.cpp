@@ -13,6 +13,7 @@
 #include <mrpt/obs/CActionCollection.h>
 #include <mrpt/obs/CActionRobotMovement2D.h>
 #include <mrpt/obs/CActionRobotMovement3D.h>
+#include <mrpt/obs/CObservation3DRangeScan.h>
 #include <mrpt/obs/CObservationOdometry.h>
 #include <mrpt/obs/CObservationRobotPose.h>
 #include <mrpt/obs/CRawlog.h>
@@ -57,13 +58,18 @@ class Reading {
       if (at == poses.end()) return;
       pose = at->second;
     }
-    if (points_.insertObservation(o, pose)) ++observations_;
+    if (const auto* image = dynamic_cast<const mrpt::obs::CObservation3DRangeScan*>(&o)) {
+      insert_image(*image, pose);
+    } else if (points_.insertObservation(o, pose)) {
+      ++observations_;
+    }
   }
 
   void rawlog(const std::string& path) {
     mrpt::obs::CRawlog log;
     if (!log.loadFromRawLogFile(path)) throw std::runtime_error("MRPT cannot load it");
-    mrpt::img::CImage::setImagesPathBase(mrpt::obs::CRawlog::detectImagesDirectory(path));
+    // CRawlog::detectImagesDirectory of 2.5.8 forgets a slash.
+    mrpt::img::CImage::setImagesPathBase(path.substr(0, path.rfind('.')) + "_Images");
     CPose3D pose;
     for (std::size_t i = 0; i < log.size(); ++i) {
       switch (log.getType(i)) {
@@ -136,6 +142,17 @@ class Reading {
     if (const auto flat = actions.getBestMovementEstimation()) return CPose3D(flat->poseChange->getMeanVal());
     const auto action = actions.getActionByClass<mrpt::obs::CActionRobotMovement3D>();
     return action ? action->poseChange.mean : CPose3D();
+  }
+
+  /// MRPT's maps take range images only where their points were made before.
+  void insert_image(const mrpt::obs::CObservation3DRangeScan& o, const CPose3D& pose) {
+    mrpt::obs::T3DPointsProjectionParams projection;
+    projection.takeIntoAccountSensorPoseOnRobot = true;
+    projection.robotPoseInTheWorld = pose;
+    Points projected;
+    const_cast<mrpt::obs::CObservation3DRangeScan&>(o).unprojectInto(projected, projection);
+    points_.insertAnotherMap(&projected, CPose3D());
+    ++observations_;
   }
 
   void whole_map(const mrpt::maps::CMetricMap& map) {
