@@ -119,6 +119,7 @@ Status merge_tiles(MapUpdater& map, const MapFile& other, bool fuse, const std::
       std::max<std::size_t>(1, other.archive().info().submaps.size()));
   for (std::size_t i = 0; i < other.archive().tiles().size(); ++i) {
     const TileRecord& tile = other.archive().tiles()[i];
+    if (tile.submap == octree_submap(other.archive().info())) continue;
     const bool apart = !fuse && tile.submap < other.archive().info().submaps.size() &&
                        !other.archive().info().submaps[tile.submap].name.empty();
     if (!apart) {

@@ -114,8 +114,8 @@ Status check_lossy(const MapFile& map, const std::vector<std::string>& originals
 }
 
 /// An octree has no order and no loss: it is the same or not.
-Status check_octree(const MapFile& map, const std::vector<std::string>& originals, const ReadSettings& settings,
-                    VerifyOutcome& v) {
+Status check_octree(const MapFile& map, const std::vector<std::string>& originals,
+                    const ReadSettings& settings, VerifyOutcome& v) {
   MAPCODEC_ASSIGN(const OctreeFile original, read_octrees(originals));
   MAPCODEC_ASSIGN(const std::string difference, compare_occupancy_map(map.path(), original, settings));
   require(v, difference.empty(), difference);
