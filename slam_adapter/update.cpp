@@ -143,7 +143,8 @@ Status merge_tiles(MapUpdater& map, const MapFile& other, bool fuse, const std::
 Result<UpdateReport> update_files(const std::string& map_path, const UpdateRequest& request, Arena& arena,
                                   std::vector<std::string>& warnings) {
   if (request.pose) MAPCODEC_TRY(check_pose(request.pose->translation_m, request.pose->rotation_xyzw));
-  if (any_octree(request.inputs)) return update_octrees(map_path, request, arena);
+  if (std::all_of(request.inputs.begin(), request.inputs.end(), is_octree_file))
+    return update_octrees(map_path, request, arena);
   MAPCODEC_ASSIGN(MapUpdater map, open_or_create(map_path, request, arena, warnings));
   MAPCODEC_TRY(check_promise(map.schema(), request));
   std::uint32_t submap = 0;
