@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "slam_adapter/compress.hpp"
 
+#include <algorithm>
 #include <filesystem>
 
 #include "slam_adapter/compress_job.hpp"
@@ -45,7 +46,8 @@ Result<CompressReport> compress_files(const std::vector<std::string>& inputs, co
   if (!options.overwrite && std::filesystem::exists(path, ignored)) {
     return make_error(ErrorCode::kCannotWrite, path + ": exists already (--force replaces it)");
   }
-  if (any_octree(inputs)) return compress_octrees(inputs, path, options);
+  if (std::all_of(inputs.begin(), inputs.end(), is_octree_file))
+    return compress_octrees(inputs, path, options);
   ReadOptions read;
   read.keep_nonfinite = options.promise == PromiseKind::lossless;
   read.unit_m = options.unit_m;

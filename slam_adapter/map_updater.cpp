@@ -10,6 +10,7 @@
 #include "parallel/runner.hpp"
 #include "slam_adapter/fold_tile.hpp"
 #include "slam_adapter/level_errors.hpp"
+#include "slam_adapter/octomap/octree_layer.hpp"
 #include "slam_adapter/point_batch.hpp"
 #include "slam_adapter/split_tile.hpp"
 #include "slam_adapter/tile_directory.hpp"
@@ -109,6 +110,7 @@ struct MapUpdater::State {
   MapSchema schema;
   PendingCoding coding;
   std::uint8_t new_level = 0;
+  std::optional<std::uint32_t> octree;  ///< submap whose tiles are no points
   std::map<std::uint32_t, TileDirectory> directories;
   std::vector<std::pair<std::uint32_t, PointCloud>> held;
   std::uint64_t held_points = 0;
@@ -163,7 +165,9 @@ Status MapUpdater::State::begin() {
   const auto level = writer.info().extras.find(kNewTileLevelExtra);
   const bool has_level = level != writer.info().extras.end() && level->second.size() == 1;
   new_level = has_level ? std::min(level->second[0], kMaxTileLevel) : usual_level(writer.tiles());
+  octree = octree_submap(writer.info());
   for (const TileRecord* t : writer.tiles()) {
+    if (t->submap == octree) continue;
     directory(t->submap).add(t->key);
     stored_points += t->points;
   }
@@ -447,7 +451,7 @@ Status MapUpdater::State::fold_some(const std::vector<Place>& places) {
 Status MapUpdater::State::fold(std::size_t least) {
   std::vector<Place> places;
   for (const TileRecord* t : writer.tiles()) {
-    if (t->segments.size() >= least) places.push_back({t->submap, t->key});
+    if (t->submap != octree && t->segments.size() >= least) places.push_back({t->submap, t->key});
   }
   const std::size_t at_once = 4 * std::size_t(arena.threads());
   for (std::size_t i = 0; i < places.size(); i += at_once) {
@@ -458,6 +462,7 @@ Status MapUpdater::State::fold(std::size_t least) {
   if (report.tiles_folded == 0) return {};
   double points = 0, squares = 0, color = 0;
   for (const TileRecord* t : writer.tiles()) {
+    if (t->submap == octree) continue;
     points += double(t->points);
     squares += double(t->points) * t->errors.rms_m * t->errors.rms_m;
     color += double(t->points) * t->errors.color_error;
@@ -554,7 +559,7 @@ Status MapUpdater::insert(PointCloud points, std::uint32_t submap) {
 Status MapUpdater::State::erase(const std::optional<Erasure>& e, std::optional<std::uint32_t> submap) {
   std::vector<Place> places;
   for (const TileRecord* t : writer.tiles()) {
-    if (!submap || t->submap == *submap) places.push_back({t->submap, t->key});
+    if (t->submap != octree && (!submap || t->submap == *submap)) places.push_back({t->submap, t->key});
   }
   for (const Place& p : places) {
     MAPCODEC_TRY(stopped());

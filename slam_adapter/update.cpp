@@ -124,6 +124,7 @@ Status merge_tiles(MapUpdater& map, const MapFile& other, bool fuse, const std::
       std::max<std::size_t>(1, other.archive().info().submaps.size()));
   for (std::size_t i = 0; i < other.archive().tiles().size(); ++i) {
     const TileRecord& tile = other.archive().tiles()[i];
+    if (tile.submap == octree_submap(other.archive().info())) continue;
     const bool apart = !fuse && tile.submap < other.archive().info().submaps.size() &&
                        !other.archive().info().submaps[tile.submap].name.empty();
     if (!apart) {
@@ -149,7 +150,8 @@ Result<UpdateReport> update_files(const std::string& map_path, const UpdateReque
   if (request.each_scan && (request.pose || !request.submap.empty() || request.unit_m != 1))
     return make_error(ErrorCode::kInvalidArgument, "scans of a bag bring their own poses, names and metres");
   if (request.pose) MAPCODEC_TRY(check_pose(request.pose->translation_m, request.pose->rotation_xyzw));
-  if (any_octree(request.inputs)) return update_octrees(map_path, request, arena);
+  if (std::all_of(request.inputs.begin(), request.inputs.end(), is_octree_file))
+    return update_octrees(map_path, request, arena);
   MAPCODEC_ASSIGN(MapUpdater map, open_or_create(map_path, request, arena, warnings));
   MAPCODEC_TRY(check_promise(map.schema(), request));
   std::uint32_t submap = 0;

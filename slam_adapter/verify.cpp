@@ -131,6 +131,15 @@ Result<VerifyOutcome> check_tiles(const MapFile& map, const ReadSettings& settin
     v.points += cloud.size();
     return Status{};
   }));
+  if (octree_submap(map.archive().info())) {
+    MAPCODEC_ASSIGN(const OccupancyMap octree, OccupancyMap::open(map.path()));
+    MAPCODEC_ASSIGN(const OccupancyTree tree, octree.read({}, settings));
+    std::uint64_t leaves = 0;
+    for (const std::size_t i : octree.tiles_in({})) leaves += map.archive().tiles()[i].points;
+    if (tree.leaf_count() != leaves)
+      return make_error(ErrorCode::kArchiveDamaged,
+                        "the octree has another number of leaves than the index says");
+  }
   if (v.points != map.summary().points) {
     return make_error(ErrorCode::kArchiveDamaged, "tiles decode to " + std::to_string(v.points) +
                                                       " points, the index says " +

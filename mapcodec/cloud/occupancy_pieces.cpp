@@ -41,8 +41,13 @@ Sizes subtree_sizes(const OccupancyTree& tree) {
 /// Walks depth first, so that what comes next in each level is known by counting.
 class Cutter {
  public:
-  Cutter(const OccupancyTree& tree, std::uint64_t most_nodes, std::vector<OccupancyExtra>& extras)
-      : tree_(tree), most_(most_nodes), sizes_(subtree_sizes(tree)), extras_(extras) {}
+  Cutter(const OccupancyTree& tree, std::uint64_t most_nodes, std::uint8_t least_height,
+         std::vector<OccupancyExtra>& extras)
+      : tree_(tree),
+        most_(most_nodes),
+        least_height_(least_height),
+        sizes_(subtree_sizes(tree)),
+        extras_(extras) {}
 
   std::vector<OccupancyPiece> run(const TileKey& root) {
     cut(tree_.root, root);
@@ -52,7 +57,8 @@ class Cutter {
  private:
   void cut(Cell cell, const TileKey& key) {
     if (cell == Cell::unknown) return;
-    if (cell != Cell::inner || sizes_[key.level][node_[key.level]] <= most_) return take(cell, key);
+    if (cell != Cell::inner || key.level <= least_height_ || sizes_[key.level][node_[key.level]] <= most_)
+      return take(cell, key);
     const std::size_t i = node_[key.level]++;
     const std::uint16_t node = tree_.levels[key.level].nodes[i];
     const auto leaves = leaf_, nodes = node_;
@@ -105,6 +111,7 @@ class Cutter {
 
   const OccupancyTree& tree_;
   std::uint64_t most_;
+  std::uint8_t least_height_;
   Sizes sizes_;
   std::vector<OccupancyExtra>& extras_;
   std::array<std::size_t, kOccupancyHeight + 1> leaf_{}, node_{};
@@ -213,8 +220,9 @@ CellCorner corner_of(const TileKey& key) {
 }
 
 std::vector<OccupancyPiece> cut_tree(const OccupancyTree& tree, std::uint64_t most_nodes,
-                                     std::vector<OccupancyExtra>& extras, const TileKey& root) {
-  return Cutter(tree, most_nodes, extras).run(root);
+                                     std::vector<OccupancyExtra>& extras, const TileKey& root,
+                                     std::uint8_t least_height) {
+  return Cutter(tree, most_nodes, least_height, extras).run(root);
 }
 
 Result<OccupancyTree> join_pieces(std::span<const OccupancyPiece> pieces,

@@ -28,10 +28,12 @@ struct OccupancyExtra {
 [[nodiscard]] CellCorner corner_of(const TileKey& key);
 
 /// Pieces of at most `most_nodes` inner nodes each, as large as that allows, in Morton order. No piece: the
-/// tree is empty. What stands above them is implied but for `extras`.
+/// tree is empty. What stands above them is implied but for `extras`. None is lower than `least_height`, even
+/// if it is larger then.
 [[nodiscard]] std::vector<OccupancyPiece> cut_tree(const OccupancyTree& tree, std::uint64_t most_nodes,
                                                    std::vector<OccupancyExtra>& extras,
-                                                   const TileKey& root = {0, 0, 0, kOccupancyHeight});
+                                                   const TileKey& root = {0, 0, 0, kOccupancyHeight},
+                                                   std::uint8_t least_height = 0);
 
 /// Undoes cut_tree. A tree of height 16.
 /// @param pieces  in Morton order, all of one kind.

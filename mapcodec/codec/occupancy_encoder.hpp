@@ -12,6 +12,6 @@ namespace mapcodec {
 [[nodiscard]] EncodedTile encode_occupancy_tile(const OccupancyPiece& piece, double resolution_m);
 
 /// Largest piece to cut a tree into: larger ones code better and are read in larger bites.
-inline constexpr std::uint64_t kOccupancyTileNodes = 65536;
+inline constexpr std::uint64_t kOccupancyTileNodes = 131072;
 
 }  // namespace mapcodec

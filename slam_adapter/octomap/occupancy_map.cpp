@@ -46,14 +46,22 @@ std::size_t slots_of(Arena* arena) {
 
 Result<OccupancyMap> OccupancyMap::open(const std::string& path, std::optional<std::uint64_t> revision) {
   MAPCODEC_ASSIGN(MapFile file, MapFile::open(path, revision));
-  const auto kind = occupancy_kind(file.schema());
-  if (!kind) return make_error(ErrorCode::kUnsupported, "holds no octree");
-  const double resolution_m = file.schema().tile_size_m;
-  return OccupancyMap(std::move(file), *kind, resolution_m);
+  if (const auto kind = occupancy_kind(file.schema())) {
+    const double resolution_m = file.schema().tile_size_m;
+    return OccupancyMap(std::move(file), *kind, resolution_m, std::nullopt);
+  }
+  const auto layer = octree_layer(file.archive().info());
+  if (!layer.ok()) return damaged(layer.error());
+  if (!*layer) return make_error(ErrorCode::kUnsupported, "holds no octree");
+  return OccupancyMap(std::move(file), *(*layer)->schema.occupancy, (*layer)->schema.tile_size_m,
+                      (*layer)->submap);
 }
 
 std::vector<std::size_t> OccupancyMap::tiles_in(const Region& region) const {
-  return file_.tiles_in(region);
+  if (!submap_) return file_.tiles_in(region);
+  std::vector<std::size_t> found = file_.archive().tiles_in(region.bounds());
+  std::erase_if(found, [&](std::size_t i) { return file_.archive().tiles()[i].submap != *submap_; });
+  return found;
 }
 
 Result<OccupancyTree> OccupancyMap::read(const Region& region, const ReadSettings& settings) const {
@@ -93,6 +101,10 @@ Result<OccupancyTree> OccupancyMap::read(const Region& region, const ReadSetting
   if (const auto it = extras.find(kOctreeNodesExtra); it != extras.end() && region.everything()) {
     MAPCODEC_ASSIGN(nodes, read_octree_nodes(it->second));
   }
+  const auto before = [](const OccupancyPiece& a, const OccupancyPiece& b) {
+    return compare_morton(a.key, b.key) < 0;
+  };
+  if (submap_) std::sort(pieces.begin(), pieces.end(), before);  // stored by their places on the points' grid
   auto tree = join_pieces(pieces, nodes);
   if (!tree.ok()) return damaged(tree.error());
   tree->kind = kind_;

@@ -7,6 +7,7 @@
 #include "slam_adapter/map_file.hpp"
 #include "slam_adapter/map_updater.hpp"
 #include "slam_adapter/octomap/octree_file.hpp"
+#include "slam_adapter/octomap/octree_layer.hpp"
 
 namespace mapcodec {
 
@@ -52,20 +53,23 @@ class OccupancyMap {
   [[nodiscard]] std::vector<std::size_t> tiles_in(const Region& region) const;
 
  private:
-  OccupancyMap(MapFile file, OccupancyKind kind, double resolution_m)
-      : file_(std::move(file)), kind_(kind), resolution_m_(resolution_m) {}
+  OccupancyMap(MapFile file, OccupancyKind kind, double resolution_m, std::optional<std::uint32_t> submap)
+      : file_(std::move(file)), kind_(kind), resolution_m_(resolution_m), submap_(submap) {}
 
   MapFile file_;
   OccupancyKind kind_;
   double resolution_m_;
+  std::optional<std::uint32_t> submap_;  ///< of an archive of points, the one that holds the octree
 };
 
 /// Replaces what the map says of the space that `tree` knows: its leaves count, where it knows nothing the
 /// map stays. Tiles in which nothing changes keep their bytes; one revision, or none if nothing changes.
+/// An archive of points gets a submap "octree" of its own for it, once.
 /// @param tree  of the map's kind and resolution (a binary map takes the cells of any).
 /// @param changed  only these voxels (OctoMap's keys, as its change detection names them); nullptr: all of
-/// the tree. Errors: those of MapWriter; InvalidArgument (resolution or kind); Unsupported (no octree in the
-/// archive).
+/// the tree.
+/// Errors: those of MapWriter; InvalidArgument (resolution or kind; the archive's grid of tiles does not
+/// fit).
 [[nodiscard]] Result<UpdateReport> update_occupancy_map(const std::string& path, const OccupancyTree& tree,
                                                         double resolution_m, const OccupancyWrite& settings,
                                                         const std::vector<CellCorner>* changed = nullptr);

@@ -43,8 +43,15 @@ Status encode_pieces(const std::vector<OccupancyPiece>& pieces, double resolutio
   return run_ordered(settings.arena, coded.size(), stages, settings.stop, "encoding an octree");
 }
 
-Status add_tile(MapWriter& writer, const TileKey& key, const EncodedTile& t) {
-  return writer.add(key, static_cast<std::uint8_t>(t.codec), t.points, t.bounds, t.errors, t.bytes);
+/// Where the octree of an archive stands.
+struct Target {
+  OctreeLayer layer;
+  OctreePlaces places;
+};
+
+Status add_tile(MapWriter& writer, const Target& target, const TileKey& key, const EncodedTile& t) {
+  return writer.add(target.places.tile_of(key), static_cast<std::uint8_t>(t.codec), t.points, t.bounds,
+                    t.errors, t.bytes, target.layer.submap);
 }
 
 MapInfo facts(const MapSchema& schema) {
@@ -58,16 +65,15 @@ MapInfo facts(const MapSchema& schema) {
 /// Walks the new tree down to where the map's tiles are.
 class Changes {
  public:
-  Changes(MapWriter& writer, const OccupancyTree& tree, std::uint64_t most,
+  Changes(MapWriter& writer, const Target& target, const OccupancyTree& tree, std::uint64_t most,
           const std::vector<CellCorner>* changed)
-      : writer_(writer), top_(tree), most_(most), whole_(changed != nullptr) {
-    for (const TileRecord* t : writer.tiles()) tiles_.emplace(t->key, t);
+      : writer_(writer),
+        top_(tree),
+        most_(most),
+        least_height_(target.places.least_height()),
+        whole_(changed != nullptr) {
     for (const TileRecord* t : writer.tiles()) {
-      TileKey k = t->key;
-      while (k.level < kOccupancyHeight) {
-        k = {k.x >> 1, k.y >> 1, k.z >> 1, static_cast<std::uint8_t>(k.level + 1)};
-        above_[k] += 1;
-      }
+      if (t->submap == target.layer.submap) note_tile(target.places.octree_key_of(t->key), t);
     }
     if (changed == nullptr) return;
     for (const CellCorner& c : *changed) {
@@ -90,9 +96,17 @@ class Changes {
             static_cast<std::int32_t>(c[2] >> h), static_cast<std::uint8_t>(h)};
   }
 
+  void note_tile(TileKey key, const TileRecord* tile) {
+    tiles_.emplace(key, tile);
+    while (key.level < kOccupancyHeight) {
+      key = {key.x >> 1, key.y >> 1, key.z >> 1, static_cast<std::uint8_t>(key.level + 1)};
+      above_[key] += 1;
+    }
+  }
+
   Status look(const OccupancyCell& cell, const TileKey& key) {
     if (whole_ ? touched_.count(key) == 0 : cell.cell == Cell::unknown) return {};
-    if (const auto tile = tiles_.find(key); tile != tiles_.end()) return change(*tile->second, cell);
+    if (const auto tile = tiles_.find(key); tile != tiles_.end()) return change(key, *tile->second, cell);
     if (above_.count(key) == 0) {
       add(cell, key);
       return {};
@@ -112,16 +126,16 @@ class Changes {
     return {};
   }
 
-  Status change(const TileRecord& tile, const OccupancyCell& cell) {
+  Status change(const TileKey& key, const TileRecord& tile, const OccupancyCell& cell) {
     MAPCODEC_ASSIGN(const Bytes bytes, writer_.read(tile.segments.front()));
     MAPCODEC_ASSIGN(OccupancyPiece old, decode_occupancy_tile(bytes));
     OccupancyTree now = top_.subtree(cell);
     if (!whole_) now = overlay(old.tree, now);
     if (now == old.tree) return {};
     ++touched;
-    if (now.root == Cell::unknown || now.inner_count() > 2 * most_) removed.push_back(tile.key);
+    if (now.root == Cell::unknown || now.inner_count() > 2 * most_) removed.push_back(key);
     if (now.root == Cell::unknown) return {};
-    cut(now, tile.key, now.inner_count() > 2 * most_ ? most_ : 2 * most_);
+    cut(now, key, now.inner_count() > 2 * most_ ? most_ : 2 * most_);
     return {};
   }
 
@@ -134,7 +148,7 @@ class Changes {
   }
 
   void cut(const OccupancyTree& tree, const TileKey& key, std::uint64_t most) {
-    for (OccupancyPiece& p : cut_tree(tree, most, nodes, key)) pieces.push_back(std::move(p));
+    for (OccupancyPiece& p : cut_tree(tree, most, nodes, key, least_height_)) pieces.push_back(std::move(p));
   }
 
   void remove_within(const TileKey& key) {
@@ -148,6 +162,7 @@ class Changes {
   MapWriter& writer_;
   OccupancyIndex top_;
   std::uint64_t most_;
+  std::uint8_t least_height_;
   bool whole_;  ///< tiles become what the tree says, not an overlay
   std::unordered_map<TileKey, const TileRecord*, TileKeyHash> tiles_;
   Counts above_, touched_;
@@ -175,18 +190,44 @@ std::vector<OccupancyExtra> merged_nodes(const MapInfo& info, const Changes& cha
 }
 
 Result<OccupancyTree> fitted(const OccupancyTree& tree, double resolution_m, const MapSchema& schema) {
-  const auto kind = occupancy_kind(schema);
-  if (!kind) return make_error(ErrorCode::kUnsupported, "holds no octree");
+  const OccupancyKind kind = *schema.occupancy;
   if (schema.tile_size_m != resolution_m)
     return make_error(ErrorCode::kInvalidArgument,
                       "the map's resolution is " + std::to_string(schema.tile_size_m) + " m, the octree's " +
                           std::to_string(resolution_m) + " m");
-  if (tree.kind != *kind && *kind == OccupancyKind::binary) return to_binary(tree);
-  if (tree.kind != *kind)
+  if (tree.kind != kind && kind == OccupancyKind::binary) return to_binary(tree);
+  if (tree.kind != kind)
     return make_error(ErrorCode::kInvalidArgument, std::string("the map's leaves are ") +
-                                                       occupancy_name(*kind) + ", the octree's " +
+                                                       occupancy_name(kind) + ", the octree's " +
                                                        occupancy_name(tree.kind));
   return tree;
+}
+
+/// A submap of its own for the octree of a map of points.
+Result<Target> begin_layer(MapWriter& writer, OccupancyKind kind, double resolution_m) {
+  MapInfo info = writer.info();
+  Target t;
+  t.layer.schema = occupancy_schema(kind, resolution_m);
+  t.places = OctreePlaces(t.layer.schema, info);
+  if (!t.places.fits())
+    return make_error(ErrorCode::kInvalidArgument,
+                      "the octree's voxels do not fit the map's tiles, whose side is " +
+                          std::to_string(info.tile_size_m) + " m");
+  if (info.submaps.empty()) info.submaps.emplace_back();
+  t.layer.submap = static_cast<std::uint32_t>(info.submaps.size());
+  info.submaps.emplace_back().name = "octree";
+  info.extras[kOctreeExtra] = write_octree_layer(t.layer);
+  MAPCODEC_TRY(writer.set_info(std::move(info)));
+  return t;
+}
+
+Result<Target> target_of(MapWriter& writer, OccupancyKind kind, double resolution_m) {
+  MAPCODEC_ASSIGN(MapSchema schema, read_schema(writer.info().schema));
+  if (occupancy_kind(schema)) return Target{{0, std::move(schema)}, {}};
+  MAPCODEC_ASSIGN(std::optional<OctreeLayer> layer, octree_layer(writer.info()));
+  if (!layer) return begin_layer(writer, kind, resolution_m);
+  const OctreePlaces places(layer->schema, writer.info());
+  return Target{std::move(*layer), places};
 }
 
 }  // namespace
@@ -196,11 +237,12 @@ Status create_occupancy_map(const std::string& path, const OccupancyTree& tree, 
   std::vector<OccupancyExtra> nodes;
   const std::vector<OccupancyPiece> pieces = cut_tree(tree, most_nodes(settings), nodes);
   if (pieces.empty()) return make_error(ErrorCode::kEmpty, "octree: holds no leaf");
-  MapInfo info = facts(occupancy_schema(tree.kind, resolution_m));
+  const Target target{{0, occupancy_schema(tree.kind, resolution_m)}, {}};
+  MapInfo info = facts(target.layer.schema);
   MAPCODEC_ASSIGN(MapWriter writer, MapWriter::create(path, info, settings.overwrite));
   MAPCODEC_TRY(encode_pieces(pieces, resolution_m, settings, [&](const TileKey& key, EncodedTile&& t) {
     info.bounds.add(t.bounds);
-    return add_tile(writer, key, t);
+    return add_tile(writer, target, key, t);
   }));
   info.input_points = tree.leaf_count();
   info.input_bytes = settings.input_bytes;
@@ -214,9 +256,9 @@ Result<UpdateReport> update_occupancy_map(const std::string& path, const Occupan
                                           double resolution_m, const OccupancyWrite& settings,
                                           const std::vector<CellCorner>* changed) {
   MAPCODEC_ASSIGN(MapWriter writer, MapWriter::open(path));
-  MAPCODEC_ASSIGN(const MapSchema schema, read_schema(writer.info().schema));
-  MAPCODEC_ASSIGN(const OccupancyTree top, fitted(tree, resolution_m, schema));
-  Changes changes(writer, top, most_nodes(settings), changed);
+  MAPCODEC_ASSIGN(const Target target, target_of(writer, tree.kind, resolution_m));
+  MAPCODEC_ASSIGN(const OccupancyTree top, fitted(tree, resolution_m, target.layer.schema));
+  Changes changes(writer, target, top, most_nodes(settings), changed);
   MAPCODEC_TRY(changes.run());
   UpdateReport report;
   report.points_in = top.leaf_count();
@@ -229,15 +271,16 @@ Result<UpdateReport> update_occupancy_map(const std::string& path, const Occupan
   const std::vector<OccupancyExtra> nodes = merged_nodes(info, changes);
   info.extras.erase(kOctreeNodesExtra);
   if (!nodes.empty()) info.extras[kOctreeNodesExtra] = write_octree_nodes(nodes);
-  for (const TileKey& key : changes.removed) MAPCODEC_TRY(writer.remove(key));
+  for (const TileKey& key : changes.removed)
+    MAPCODEC_TRY(writer.remove(target.places.tile_of(key), target.layer.submap));
   MAPCODEC_TRY(
       encode_pieces(changes.pieces, resolution_m, settings, [&](const TileKey& key, EncodedTile&& t) {
         report.bytes += t.bytes.size();
         report.points_added += t.points;
-        return add_tile(writer, key, t);
+        return add_tile(writer, target, key, t);
       }));
   info.bounds = writer.posed_bounds();
-  info.input_points += report.points_in;
+  if (!octree_submap(info)) info.input_points += report.points_in;  // of points otherwise
   info.input_bytes += settings.input_bytes;
   MAPCODEC_TRY(writer.set_info(std::move(info)));
   MAPCODEC_ASSIGN(report.revision, writer.commit(settings.timestamp_s));

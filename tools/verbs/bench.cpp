@@ -22,6 +22,7 @@ int run(Arguments& a) {
   const Status s = a.what == "paper"     ? bench_paper(a.settings)
                    : a.what == "formats" ? bench_formats(a.settings)
                    : a.what == "local"   ? bench_local(a.settings)
+                   : a.what == "octomap" ? bench_octomap(a.settings)
                    : a.what == "scaling" ? bench_scaling(a.settings)
                    : a.what == "seams"   ? bench_seams(a.settings)
                    : a.what == "surface" ? bench_surface(a.settings)
@@ -37,9 +38,10 @@ int run(Arguments& a) {
 void add_bench(CLI::App& app, Action& action) {
   auto a = std::make_shared<Arguments>();
   CLI::App* verb = app.add_subcommand("bench", "Measurements on a folder of clouds: JSON, tables and plots");
-  verb->add_option("WHAT", a->what, "formats, local, paper, rate, scaling, seams, surface or update")
+  verb->add_option("WHAT", a->what, "formats, local, octomap, paper, rate, scaling, seams, surface or update")
       ->required()
-      ->check(CLI::IsMember({"formats", "local", "paper", "rate", "scaling", "seams", "surface", "update"}));
+      ->check(CLI::IsMember(
+          {"formats", "local", "octomap", "paper", "rate", "scaling", "seams", "surface", "update"}));
   verb->add_option("--data", a->settings.data, "Folder that is searched for clouds")->required();
   verb->add_option("-o,--output", a->settings.report, "Folder for the report")->required();
   verb->add_option("--threads", a->settings.threads, "0: all cores")->check(CLI::Range(0, 1024));
