@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Everything that mapcodecd can be told.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "maps/service/map_service.hpp"
+
+namespace mapcodec::daemon {
+
+struct TlsSettings {
+  std::string certificate_file, key_file;  ///< PEM; both empty: plain text
+  std::string client_ca_file;              ///< PEM; given: clients need a certificate signed by it
+  [[nodiscard]] bool enabled() const { return !certificate_file.empty(); }
+};
+
+struct GrpcSettings {
+  /// "127.0.0.1:7311", "[::1]:0" (a free port), "unix:/run/mapcodecd.sock" (made with mode 0600).
+  std::vector<std::string> listen{"127.0.0.1:7311"};
+  TlsSettings tls;                                        ///< of the ports that are no sockets
+  bool insecure = false;                                  ///< plain text beyond loopback
+  std::uint64_t max_message_bytes = std::uint64_t{16} << 20;
+  std::uint32_t max_connections = 1000;
+  std::uint32_t max_streams_per_connection = 64;
+  std::uint64_t stream_window_points = std::uint64_t{1} << 19;  ///< of one Insert stream, not yet committed
+  double idle_stream_s = 60;                              ///< an Insert stream that sends nothing ends
+  double handshake_s = 5;
+  unsigned workers = 4;                                   ///< threads for calls that wait or decode
+  std::size_t waiting_calls = 256;                        ///< for a worker; more are told Busy
+};
+
+struct DaemonSettings {
+  ServiceSettings service;
+  GrpcSettings grpc;
+  double drain_s = 30;    ///< after SIGTERM: then calls that still run are cut off
+  std::string port_file;  ///< where the ports that were bound are written, one address a line; empty: nowhere
+};
+
+}  // namespace mapcodec::daemon
