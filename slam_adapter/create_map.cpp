@@ -69,9 +69,8 @@ Result<MapSchema> schema_for(Survey look, const CompressOptions& options, Arena&
 
 }  // namespace
 
-Result<MapUpdater> create_map(const std::string& path, PointSource& first, const CompressOptions& options,
-                              Arena& arena, const UpdateSettings& settings,
-                              std::vector<std::string>& warnings) {
+Result<MapSchema> schema_for_growth(PointSource& first, const CompressOptions& options, Arena& arena,
+                                    const std::string& path, std::vector<std::string>& warnings) {
   MAPCODEC_TRY(check(options));
   SurveySettings survey_settings;
   survey_settings.arena = &arena;
@@ -79,8 +78,13 @@ Result<MapUpdater> create_map(const std::string& path, PointSource& first, const
   if (options.max_memory_bytes > 0) survey_settings.memory_budget_bytes = options.max_memory_bytes;
   MAPCODEC_ASSIGN(Survey look, survey(first, survey_settings));
   const auto parent = std::filesystem::path(path).parent_path();
-  MAPCODEC_ASSIGN(const MapSchema schema, schema_for(std::move(look), options, arena,
-                                                     parent.empty() ? "." : parent.string(), warnings));
+  return schema_for(std::move(look), options, arena, parent.empty() ? "." : parent.string(), warnings);
+}
+
+Result<MapUpdater> create_map(const std::string& path, PointSource& first, const CompressOptions& options,
+                              Arena& arena, const UpdateSettings& settings,
+                              std::vector<std::string>& warnings) {
+  MAPCODEC_ASSIGN(const MapSchema schema, schema_for_growth(first, options, arena, path, warnings));
   MapInfo info;
   info.schema = write_schema(schema);
   info.origin = schema.origin;

@@ -2,8 +2,10 @@
 // What the service needs of those who look inside tiles: it stores maps, others code them.
 #pragma once
 
+#include <atomic>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -11,7 +13,7 @@
 #include "mapcodec/cloud/map_schema.hpp"
 #include "mapcodec/cloud/point_cloud.hpp"
 #include "mapcodec/codec/tile_segments.hpp"
-#include "maps/compaction.hpp"
+#include "maps/map_types.hpp"
 #include "maps/submap_pose.hpp"
 
 namespace mapcodec {
@@ -49,6 +51,8 @@ class MapEditor {
   /// Points of a submap, or of all (then `e` is in the map's frame); nothing: all of them.
   [[nodiscard]] virtual Status erase(const std::optional<Erasure>& e,
                                      std::optional<std::uint32_t> submap) = 0;
+  /// Codes for good what was coded quickly. Takes long; see MapCoding::edit.
+  [[nodiscard]] virtual Status fold() = 0;
   /// A fact that is stored with the next commit that stores anything else.
   virtual void set_extra(const std::string& name, Bytes value) = 0;
   [[nodiscard]] virtual Result<EditReport> commit(std::int64_t timestamp_s) = 0;
@@ -60,8 +64,10 @@ class MapCoding {
   virtual ~MapCoding() = default;
   /// Begins an archive at `path` and commits it empty. Errors: InvalidArgument, Unsupported, CannotWrite.
   [[nodiscard]] virtual Status create(const std::string& path, const NewMap& map) = 0;
+  /// @param stop  becomes true: `fold` and `commit` end with Cancelled. nullptr: never.
   /// Errors: as MapWriter::open; Unsupported.
-  [[nodiscard]] virtual Result<std::unique_ptr<MapEditor>> edit(const std::string& path) = 0;
+  [[nodiscard]] virtual Result<std::unique_ptr<MapEditor>> edit(const std::string& path,
+                                                                const std::atomic<bool>* stop) = 0;
   /// Whether points can go into a map with this schema, without looking at the archive.
   /// Errors: Malformed (a kept channel is missing or of another type).
   [[nodiscard]] virtual Status check(const PointCloud& points, const MapSchema& schema) const = 0;
@@ -69,8 +75,10 @@ class MapCoding {
   [[nodiscard]] virtual Result<PointCloud> decode(const std::vector<ByteSpan>& segments,
                                                   const MapSchema& schema, std::optional<unsigned> level,
                                                   const DecodeLimits& limits) const = 0;
-  /// What compaction folds with.
-  [[nodiscard]] virtual TileFolder folder() const = 0;
+  /// The first bytes of a base that `decode` needs for this level of detail; all of them where it has no
+  /// levels.
+  [[nodiscard]] virtual Result<std::uint64_t> bytes_of_level(ByteSpan base, const MapSchema& schema,
+                                                             unsigned level) const = 0;
 };
 
 }  // namespace mapcodec

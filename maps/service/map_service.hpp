@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "maps/compaction.hpp"
 #include "maps/map_archive.hpp"
 #include "maps/map_changes.hpp"
 #include "maps/service/map_catalogue.hpp"
@@ -164,9 +165,9 @@ class MapService {
   [[nodiscard]] Result<CompactReport> compact(const std::string& name, const CompactJob& job);
 
   /// Calls `changed` from a thread of the service whenever the map has a new revision or goes away, until
-  /// the handle is gone; it must not wait. Not called any more once the handle's destructor has returned.
+  /// the watcher (watch_list.hpp) is destroyed. `changed` must neither wait nor destroy a watcher.
   class Watcher;
-  [[nodiscard]] Result<std::shared_ptr<Watcher>> watch(const std::string& name, std::function<void()> changed);
+  [[nodiscard]] Result<std::unique_ptr<Watcher>> watch(const std::string& name, std::function<void()> changed);
 
   [[nodiscard]] Result<MapStats> stats(const std::string& name) const;
   [[nodiscard]] ServiceStats stats() const;

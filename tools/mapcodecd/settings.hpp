@@ -33,6 +33,7 @@ struct GrpcSettings {
 struct DaemonSettings {
   ServiceSettings service;
   GrpcSettings grpc;
+  std::uint64_t editor_cache_bytes = std::uint64_t{128} << 20;  ///< of what is known of a map that is written to
   double drain_s = 30;    ///< after SIGTERM: then calls that still run are cut off
   std::string port_file;  ///< where the ports that were bound are written, one address a line; empty: nowhere
 };
