@@ -86,9 +86,9 @@ class UploadStream final : public grpc::ServerReadReactor<v1::UploadRequest>, pu
     call_.context.streams.remove(this);
     delete this;
   }
-  void wind_up() override { call_.grpc.TryCancel(); }
+  void wind_up() override { call_.rpc.TryCancel(); }
   void look_at_clock(std::chrono::steady_clock::time_point) override {
-    if (double(now_ns() - last_message_) * 1e-9 > call_.context.settings.idle_stream_s) call_.grpc.TryCancel();
+    if (double(now_ns() - last_message_) * 1e-9 > call_.context.settings.idle_stream_s) call_.rpc.TryCancel();
   }
 
  private:
@@ -114,7 +114,7 @@ class UploadStream final : public grpc::ServerReadReactor<v1::UploadRequest>, pu
   }
 
   Status finish() {
-    if (call_.grpc.IsCancelled()) return make_error(ErrorCode::kCancelled, "the client gave up");
+    if (call_.rpc.IsCancelled()) return make_error(ErrorCode::kCancelled, "the client gave up");
     if (file_ == nullptr) return make_error(ErrorCode::kMalformed, "nothing was sent");
     const bool written = std::fflush(file_) == 0 && ::fsync(::fileno(file_)) == 0;
     if (!written) return cannot_write();

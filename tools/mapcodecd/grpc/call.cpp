@@ -86,7 +86,7 @@ Credentials credentials_of(const grpc::CallbackServerContext& grpc) {
 
 Status Call::admit(Right right, const std::string& map, CallKind kind) {
   if (context.stopping) return make_error(ErrorCode::kUnreachable, "the daemon is about to end");
-  who_ = credentials_of(grpc);
+  who_ = credentials_of(rpc);
   MAPCODEC_ASSIGN(admission_, context.access.admit(who_, right, map, kind));
   return {};
 }
@@ -114,10 +114,10 @@ grpc::Status Call::end(const Status& s) {
   const double took = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
   context.metrics.request("grpc", method_, name_of(code), took);
   if (s.ok()) return grpc::Status::OK;
-  grpc.AddTrailingMetadata(kErrorKey, std::string(error_name(s.error().code)));
+  rpc.AddTrailingMetadata(kErrorKey, std::string(error_name(s.error().code)));
   if (code == grpc::StatusCode::RESOURCE_EXHAUSTED) {
     const bool disk = s.error().code == ErrorCode::kCannotWrite;
-    grpc.AddTrailingMetadata(kRetryKey, std::to_string(disk ? 2000 : context.service.retry_after_ms()));
+    rpc.AddTrailingMetadata(kRetryKey, std::to_string(disk ? 2000 : context.service.retry_after_ms()));
   }
   return {code, s.error().to_string()};
 }

@@ -61,8 +61,8 @@ struct CallContext {
 /// One call from its beginning to its end. Threads: one at a time.
 class Call {
  public:
-  Call(CallContext& context, grpc::CallbackServerContext& grpc, const char* method)
-      : context(context), grpc(grpc), method_(method), begin_(std::chrono::steady_clock::now()) {}
+  Call(CallContext& of_server, grpc::CallbackServerContext& of_grpc, const char* method)
+      : context(of_server), rpc(of_grpc), method_(method), begin_(std::chrono::steady_clock::now()) {}
 
   /// Errors: as AccessControl::admit; Busy (the daemon ends).
   [[nodiscard]] Status admit(Right right, const std::string& map, CallKind kind);
@@ -75,7 +75,7 @@ class Call {
   [[nodiscard]] const Credentials& credentials() const { return who_; }
 
   CallContext& context;
-  grpc::CallbackServerContext& grpc;
+  grpc::CallbackServerContext& rpc;
 
  private:
   const char* method_;
@@ -94,7 +94,7 @@ grpc::ServerUnaryReactor* answer(CallContext& context, grpc::CallbackServerConte
   Status s = call->admit(right, map, CallKind::unary);
   if (s.ok()) s = call->charge_in(request_bytes);
   const auto work = [call, reactor, body]() mutable {
-    if (call->grpc.IsCancelled()) {
+    if (call->rpc.IsCancelled()) {
       reactor->Finish(call->end(make_error(ErrorCode::kCancelled, "the client gave up")));
       return;
     }
@@ -141,7 +141,7 @@ class ReplyStream : public grpc::ServerWriteReactor<Reply>, public OpenStream {
     const auto since = waits_since_.load();
     const bool waits = since != std::chrono::steady_clock::time_point::max() && now > since;
     if (waits && now - since > std::chrono::duration<double>(4 * call_.context.settings.idle_stream_s))
-      call_.grpc.TryCancel();
+      call_.rpc.TryCancel();
   }
 
  protected:
@@ -155,7 +155,7 @@ class ReplyStream : public grpc::ServerWriteReactor<Reply>, public OpenStream {
  private:
   void step() {
     reply_.Clear();
-    Result<bool> more = call_.grpc.IsCancelled()
+    Result<bool> more = call_.rpc.IsCancelled()
                             ? Result<bool>(make_error(ErrorCode::kCancelled, "the client gave up"))
                             : next(reply_);
     if (more.ok() && *more) {

@@ -22,7 +22,7 @@ class DecodeStream final : public ReplyStream<v1::DecodeReply> {
       return true;
     }
     while (sent_ == cloud_.size()) {
-      if (at_ == tiles_.size() || call().grpc.IsCancelled()) return false;
+      if (at_ == tiles_.size() || call().rpc.IsCancelled()) return false;
       MAPCODEC_TRY(decode(tiles_[at_++]));
     }
     const std::size_t end = std::min(cloud_.size(), sent_ + kPointsAtOnce);

@@ -137,7 +137,7 @@ class InsertStream final : public grpc::ServerBidiReactor<v1::InsertRequest, v1:
   /// Whatever can be begun now is begun. Called under the lock; the stream may be gone after it is released.
   void go_on() {
     if (finished_) return;
-    if (!writing_ && durable_ > told_ && !call_.grpc.IsCancelled()) {
+    if (!writing_ && durable_ > told_ && !call_.rpc.IsCancelled()) {
       told_ = durable_;
       reply_.Clear();
       reply_.set_sequence(durable_);
