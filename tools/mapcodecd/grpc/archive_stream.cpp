@@ -65,22 +65,17 @@ class UploadStream final : public grpc::ServerReadReactor<v1::UploadRequest>, pu
     context.streams.add(this);
     StartRead(&request_);
   }
-  ~UploadStream() override {
-    if (file_ != nullptr) std::fclose(file_);
-    if (!path_.empty()) ::unlink(path_.c_str());
-  }
+  ~UploadStream() override { discard(); }
 
   void OnReadDone(bool ok) override {
     last_message_ = now_ns();
     if (!ok) {
-      call_.context.pool.go_on([this] { Finish(call_.end(finish())); });
-      return;
+      call_.context.pool.go_on([this] { end(finish()); });
+    } else if (const Status s = take(); !s.ok()) {
+      end(s);
+    } else {
+      StartRead(&request_);
     }
-    if (const Status s = take(); !s.ok()) {
-      Finish(call_.end(s));
-      return;
-    }
-    StartRead(&request_);
   }
   void OnDone() override {
     call_.context.streams.remove(this);
@@ -93,6 +88,19 @@ class UploadStream final : public grpc::ServerReadReactor<v1::UploadRequest>, pu
 
  private:
   static std::int64_t now_ns() { return std::chrono::steady_clock::now().time_since_epoch().count(); }
+
+  void end(const Status& s) {
+    discard();
+    Finish(call_.end(s));
+  }
+
+  /// Whatever was not taken over by the service.
+  void discard() {
+    if (file_ != nullptr) std::fclose(file_);
+    if (!path_.empty()) ::unlink(path_.c_str());
+    file_ = nullptr;
+    path_.clear();
+  }
 
   Status take() {
     if (file_ == nullptr) {

@@ -19,6 +19,18 @@ struct HashHash {
   }
 };
 
+using HashSet = std::unordered_set<ContentHash, HashHash>;
+
+Result<HashSet> hashes_of(std::string_view bytes) {
+  if (bytes.size() % 16 != 0) return make_error(ErrorCode::kMalformed, "hashes have 16 bytes each");
+  HashSet hashes;
+  for (std::size_t i = 0; i < bytes.size(); i += 16) {
+    MAPCODEC_ASSIGN(const ContentHash h, wire::read_hash(bytes.substr(i, 16)));
+    hashes.insert(h);
+  }
+  return hashes;
+}
+
 Result<TileSelection> selection_of(const v1::GetTilesRequest& r) {
   TileSelection s;
   for (const v1::TileKey& k : r.keys()) {
@@ -57,12 +69,8 @@ class TileStream final : public ReplyStream<v1::GetTilesReply> {
     MAPCODEC_ASSIGN(view_, call().context.service.view(request_.map(), request_.revision()));
     MAPCODEC_ASSIGN(const TileSelection selection, selection_of(request_));
     MAPCODEC_ASSIGN(tiles_, MapService::select(*view_, selection));
-    const std::string& have = request_.if_none_match();
-    if (have.size() % 16 != 0) return make_error(ErrorCode::kMalformed, "hashes have 16 bytes each");
-    for (std::size_t i = 0; i < have.size(); i += 16) {
-      MAPCODEC_ASSIGN(const ContentHash h, wire::read_hash(std::string_view(have).substr(i, 16)));
-      have_.insert(h);
-    }
+    MAPCODEC_ASSIGN(have_, hashes_of(request_.if_none_match()));
+    MAPCODEC_ASSIGN(have_segments_, hashes_of(request_.have_segments()));
     coarse_ = request_.coarse_level() > 0 && !request_.without_bytes();
     set_light(!coarse_);
     wire::write(*view_->archive, *reply.mutable_facts());
@@ -113,8 +121,8 @@ class TileStream final : public ReplyStream<v1::GetTilesReply> {
       if (double(leading) > kWorthwhile * double(size)) return false;
     }
     write_head(record, hash, known, leading, *reply.mutable_tile());
-    make_parts(segments, leading);
-    sent_ += coarse_ ? 0 : (known ? 0 : size);
+    make_parts(segments, leading, reply.tile());
+    if (!coarse_ && !known) sent_ += size;
     using Counter = ServiceMetrics::Counter;
     call().context.metrics.add(known ? Counter::tiles_not_modified : Counter::tiles_out);
     return true;
@@ -138,12 +146,17 @@ class TileStream final : public ReplyStream<v1::GetTilesReply> {
       tile.add_segment_bytes(s.length);
       tile.add_segment_crc(s.crc);
     }
+    for (const ContentHash& h : record.hashes) tile.mutable_segment_hashes()->append(wire::bytes_of(h));
+    if (have_segments_.empty() || known || record.hashes.empty()) return;
+    for (const ContentHash& h : record.hashes) tile.add_segment_sent(!have_segments_.contains(h));
   }
 
-  void make_parts(const Segments& segments, std::uint64_t leading) {
+  void make_parts(const Segments& segments, std::uint64_t leading, const v1::Tile& tile) {
     parts_.clear();
     part_ = 0;
-    for (const auto& s : segments) {
+    for (std::size_t i = 0; i < segments.size(); ++i) {
+      if (leading == 0 && tile.segment_sent_size() > 0 && !tile.segment_sent(static_cast<int>(i))) continue;
+      const auto& s = segments[i];
       const std::size_t size = leading > 0 ? leading : s->size();
       for (std::size_t at = 0; at < size; at += kPartBytes)
         parts_.push_back({s, at, std::min(kPartBytes, size - at)});
@@ -169,7 +182,7 @@ class TileStream final : public ReplyStream<v1::GetTilesReply> {
   const v1::GetTilesRequest request_;
   MapViewPtr view_;
   std::vector<std::size_t> tiles_;
-  std::unordered_set<ContentHash, HashHash> have_;
+  HashSet have_, have_segments_;
   std::vector<Part> parts_;
   std::size_t part_ = 0, at_ = 0;
   std::uint64_t sent_ = 0;
