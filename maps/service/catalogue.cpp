@@ -50,14 +50,21 @@ Status prepare_schema(Database& database) {
   return {};
 }
 
+Result<Database> open_database(const std::string& path) {
+  MAPCODEC_ASSIGN(Database database, Database::open(path));
+  MAPCODEC_TRY(prepare_schema(database));
+  return database;
+}
+
 }  // namespace
 
 Catalogue::Catalogue(std::unique_ptr<State> state) : state_(std::move(state)) {}
 Catalogue::~Catalogue() = default;
 
 Result<std::unique_ptr<Catalogue>> Catalogue::open(const std::string& path, const Retention& defaults) {
-  MAPCODEC_ASSIGN(Database database, Database::open(path));
-  MAPCODEC_TRY(prepare_schema(database));
+  auto opened = open_database(path);
+  if (!opened.ok()) return make_error(opened.error().code, path + ": " + opened.error().message);
+  Database database = std::move(opened).value();
   auto state = std::make_unique<State>(std::move(database), defaults);
   MAPCODEC_ASSIGN(Statement check,
                   state->database.prepare(

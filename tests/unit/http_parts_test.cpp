@@ -7,7 +7,7 @@
 
 #include "tools/mapcodecd/http/conditional.hpp"
 #include "tools/mapcodecd/http/http_answer.hpp"
-#include "tools/mapcodecd/http/request_id.hpp"
+#include "tools/mapcodecd/request_record.hpp"
 #include "tools/mapcodecd/http/tile_path.hpp"
 
 namespace mapcodec::daemon {

@@ -61,7 +61,8 @@ struct LogSettings {
 struct DaemonSettings {
   ServiceSettings service;
   GrpcSettings grpc;
-  std::uint64_t editor_cache_bytes = std::uint64_t{128} << 20;  ///< of what is known of a map that is written to
+  std::uint64_t editor_cache_bytes = std::uint64_t{128}
+                                     << 20;  ///< of what is known of a map that is written to
   HttpSettings http;
   AccessSettings access;
   LogSettings log;

@@ -48,6 +48,7 @@ HttpAnswer plain_answer(int status, const std::string& line) {
 
 HttpAnswer error_answer(const Error& error) {
   HttpAnswer answer = plain_answer(status_of(error.code), error.to_string());
+  answer.error = error.to_string();
   if (answer.status == 401) answer.headers.emplace_back("WWW-Authenticate", "Bearer realm=\"mapcodecd\"");
   if (answer.status == 429) answer.headers.emplace_back("Retry-After", "1");
   return answer;

@@ -36,6 +36,7 @@ struct HttpAnswer {
   std::vector<SharedBytes> body;  ///< one after the other
   std::string route = "other";    ///< for counting
   std::string principal;
+  std::string error;  ///< what went wrong, for the log
 
   [[nodiscard]] std::uint64_t size() const;
 };

@@ -7,7 +7,6 @@
 
 #include "maps/service/tokens.hpp"
 #include "tools/mapcodecd/http/map_routes.hpp"
-#include "tools/mapcodecd/http/request_id.hpp"
 
 namespace mapcodec::daemon {
 namespace {
@@ -93,7 +92,7 @@ class Parser final : public httplib::Server {
 /// The request that this thread is at work on.
 struct AtWork {
   Connection* connection = nullptr;
-  HttpRecord record;
+  RequestRecord record;
   std::string route;
   bool close = false;
 };
@@ -133,16 +132,16 @@ HttpAnswer HttpServer::Impl::answer(const httplib::Request& request) {
 
 void HttpServer::Impl::handle(const httplib::Request& request, httplib::Response& response) {
   HttpAnswer made = answer(request);
-  at_work.record.request_id = request_id(request.get_header_value("X-Request-Id"));
-  at_work.record.method = request.method;
-  at_work.record.path = request.path;
+  at_work.record.id = request_id(request.get_header_value("X-Request-Id"));
+  at_work.record.method = request.method + " " + request.path;
   at_work.record.principal = made.principal;
-  at_work.record.status = made.status;
+  at_work.record.code = std::to_string(made.status);
+  at_work.record.error = made.error;
   at_work.route = made.route;
   at_work.close = has_body(request) || made.status == 405;  // a body is not read: what follows is no request
   response.status = made.status;
   for (const auto& [name, value] : made.headers) response.set_header(name, value);
-  response.set_header("X-Request-Id", at_work.record.request_id);
+  response.set_header("X-Request-Id", at_work.record.id);
   if (at_work.close) response.set_header("Connection", "close");
   set_body(made, response);
 }
@@ -151,20 +150,21 @@ bool HttpServer::Impl::serve(Connection& connection) {
   const auto begin = std::chrono::steady_clock::now();
   const std::uint64_t sent_before = connection.bytes_sent();
   at_work = {&connection, {}, "other", false};
-  at_work.record.status = 400;  // what the parser says of what it cannot read
+  at_work.record.code = "400";  // what the parser says of what it cannot read
   bool close = false, good = false;
   try {
     good = parser.answer(connection, close);
   } catch (const std::exception&) {
-    at_work.record.status = 500;
+    at_work.record.code = "500";
   }
-  HttpRecord& record = at_work.record;
+  RequestRecord& record = at_work.record;
+  record.transport = "http";
   record.peer = connection.peer().name;
-  record.bytes = connection.bytes_sent() - sent_before;
+  record.bytes_out = connection.bytes_sent() - sent_before;
   record.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-  metrics.request("http", at_work.route, std::to_string(record.status), record.seconds);
+  metrics.request("http", at_work.route, record.code, record.seconds);
   if (hooks.record) hooks.record(record);
-  return good && !close && !at_work.close && !record.request_id.empty();
+  return good && !close && !at_work.close && !record.id.empty();
 }
 
 HttpServer::HttpServer(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}

@@ -18,21 +18,14 @@
 #include "maps/service/access.hpp"
 #include "maps/service/map_service.hpp"
 #include "tools/mapcodecd/http/http_listener.hpp"
+#include "tools/mapcodecd/request_record.hpp"
 
 namespace mapcodec::daemon {
 
-/// A request that has ended, for the log.
-struct HttpRecord {
-  std::string request_id, principal, peer, method, path;
-  int status = 0;
-  std::uint64_t bytes = 0;  ///< sent
-  double seconds = 0;
-};
-
 /// What the server needs beside the maps.
 struct HttpHooks {
-  std::function<std::string()> metrics_text;      ///< the page /metrics
-  std::function<void(const HttpRecord&)> record;  ///< called after each request; may be empty
+  std::function<std::string()> metrics_text;  ///< the page /metrics
+  RecordRequest record;                       ///< may be empty
 };
 
 /// Threads: methods from any.

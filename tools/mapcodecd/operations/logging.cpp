@@ -138,16 +138,18 @@ void log_event(LogLevel level, std::string_view message, std::initializer_list<L
   fields_of_line = nullptr;
 }
 
-void log_request(const HttpRecord& r, LogLevel level) {
+void log_request(const RequestRecord& r, LogLevel level) {
   log_event(level, "request",
-            {{"id", r.request_id},
+            {{"id", r.id},
+             {"transport", r.transport},
              {"method", r.method},
-             {"path", r.path},
-             {"status", std::int64_t{r.status}},
-             {"bytes", static_cast<std::int64_t>(r.bytes)},
+             {"code", r.code},
+             {"bytes_in", static_cast<std::int64_t>(r.bytes_in)},
+             {"bytes_out", static_cast<std::int64_t>(r.bytes_out)},
              {"ms", std::round(r.seconds * 1e6) / 1e3},
              {"principal", r.principal},
-             {"peer", r.peer}});
+             {"peer", r.peer},
+             {"error", r.error}});
 }
 
 }  // namespace mapcodec::daemon

@@ -9,7 +9,7 @@
 #include <variant>
 
 #include "mapcodec/base/result.hpp"
-#include "tools/mapcodecd/http/http_server.hpp"
+#include "tools/mapcodecd/request_record.hpp"
 #include "tools/mapcodecd/settings.hpp"
 
 namespace mapcodec::daemon {
@@ -29,6 +29,6 @@ struct LogField {
 void log_event(LogLevel level, std::string_view message, std::initializer_list<LogField> fields = {});
 
 /// The line of a request. @param level  info, or debug where requests are not to be seen.
-void log_request(const HttpRecord& record, LogLevel level);
+void log_request(const RequestRecord& record, LogLevel level);
 
 }  // namespace mapcodec::daemon

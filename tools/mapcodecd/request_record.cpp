@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "tools/mapcodecd/http/request_id.hpp"
+#include "tools/mapcodecd/request_record.hpp"
 
 #include <algorithm>
 #include <atomic>
