@@ -82,6 +82,12 @@ void set_body(HttpAnswer& answer, httplib::Response& response) {
 /// cpp-httplib's parser and writer over connections that are not its own.
 class Parser final : public httplib::Server {
  public:
+  explicit Parser(const HttpSettings& settings) {
+    svr_sock_ = 0;  // it has no socket of its own, but takes the lack of one for the end of the server
+    // What it tells clients; the listener keeps it.
+    set_keep_alive_timeout(static_cast<time_t>(settings.idle_timeout_s));
+    set_keep_alive_max_count(1000000);
+  }
   /// @param close  becomes true when the client or the answer ends the connection.
   [[nodiscard]] bool answer(Connection& connection, bool& close) {
     ConnectionStream stream(connection);
@@ -101,8 +107,9 @@ thread_local AtWork at_work;
 }  // namespace
 
 struct HttpServer::Impl {
-  Impl(MapService& service, AccessControl& access, ServiceMetrics& m, HttpHooks h)
-      : metrics(m), hooks(std::move(h)), routes(service, access, metrics, hooks) {
+  Impl(const HttpSettings& settings, MapService& service, AccessControl& access, ServiceMetrics& m,
+       HttpHooks h)
+      : metrics(m), hooks(std::move(h)), routes(service, access, metrics, hooks), parser(settings) {
     parser.set_pre_routing_handler([this](const httplib::Request& request, httplib::Response& response) {
       handle(request, response);
       return httplib::Server::HandlerResponse::Handled;
@@ -173,7 +180,7 @@ HttpServer::~HttpServer() = default;
 Result<std::unique_ptr<HttpServer>> HttpServer::start(const HttpSettings& settings, MapService& service,
                                                       AccessControl& access, ServiceMetrics& metrics,
                                                       HttpHooks hooks) {
-  auto impl = std::make_unique<Impl>(service, access, metrics, std::move(hooks));
+  auto impl = std::make_unique<Impl>(settings, service, access, metrics, std::move(hooks));
   Impl* shared = impl.get();
   MAPCODEC_ASSIGN(impl->listener,
                   HttpListener::start(settings, [shared](Connection& c) { return shared->serve(c); }));
