@@ -1,15 +1,18 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // mapcodecd: serves a folder of maps. In the foreground, logs to stderr, ends on SIGTERM.
-#include <spdlog/sinks/stdout_color_sinks.h>
-#include <spdlog/spdlog.h>
-
 #include <CLI/CLI.hpp>
 #include <csignal>
+#include <cstdio>
 
+#include "tools/mapcodecd/config/config.hpp"
 #include "tools/mapcodecd/daemon.hpp"
+#include "tools/mapcodecd/operations/command_line.hpp"
+#include "tools/mapcodecd/operations/logging.hpp"
 #include "tools/version.hpp"
 
 namespace {
+
+using namespace mapcodec::daemon;
 
 std::atomic<bool> stop_requested{false};
 
@@ -19,28 +22,12 @@ void request_stop(int signal) {
   std::signal(signal, SIG_DFL);
 }
 
-int exit_code(mapcodec::ErrorCode code) {
-  switch (code) {
-    case mapcodec::ErrorCode::kInvalidArgument:
-      return 2;
-    case mapcodec::ErrorCode::kCannotWrite:
-      return 4;
-    default:
-      return 3;
-  }
-}
-
-}  // namespace
-
-int main(int argc, char** argv) {
-  spdlog::set_default_logger(spdlog::stderr_color_mt("mapcodecd"));
-  CLI::App app{"mapcodecd: a folder of maps, served over the network"};
+int parse(CLI::App& app, int argc, char** argv, CommandLine& line) {
   app.set_version_flag("--version", std::string("mapcodecd ") + mapcodec::kVersion);
-  mapcodec::daemon::DaemonSettings settings;
-  app.add_option("--data", settings.service.folder, "Folder of the archives")->required();
-  app.add_option("--listen", settings.grpc.listen, "HOST:PORT, [HOST]:PORT or unix:/PATH; may be repeated");
-  app.add_option("--port-file", settings.port_file, "Where the bound addresses are written");
-  app.add_flag("--insecure", settings.grpc.insecure, "Plain text also beyond this machine");
+  app.require_subcommand(0, 1);
+  add_options(app, line);
+  add_token_verbs(app, line);
+  add_catalogue_verbs(app, line);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
@@ -48,13 +35,38 @@ int main(int argc, char** argv) {
     std::fprintf(stderr, "mapcodecd: %s (see mapcodecd --help)\n", e.what());
     return 2;
   }
+  return -1;
+}
+
+int serve(const DaemonSettings& settings) {
+  const mapcodec::Status logging = start_logging(settings.log);
+  if (!logging.ok()) return fail(logging.error());
   std::signal(SIGTERM, request_stop);
   std::signal(SIGINT, request_stop);
   // A client that goes away, or a file size limit, is an error of a call and not a death.
   std::signal(SIGPIPE, SIG_IGN);
   std::signal(SIGXFSZ, SIG_IGN);
-  const mapcodec::Status s = mapcodec::daemon::run(settings, stop_requested);
-  if (s.ok()) return 0;
-  std::fprintf(stderr, "mapcodecd: %s\n", s.error().to_string().c_str());
-  return exit_code(s.error().code);
+  const mapcodec::Status s = run(settings, stop_requested);
+  return s.ok() ? 0 : fail(s.error());
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app{"mapcodecd: a folder of maps, served over the network"};
+  CommandLine line;
+  if (const int ended = parse(app, argc, argv, line); ended >= 0) return ended;
+  try {
+    const auto settings = settings_of(line);
+    if (!settings.ok()) return fail(settings.error());
+    if (line.print_config) return std::fputs(print_config(*settings).c_str(), stdout) < 0 ? 4 : 0;
+    if (line.check_config) return report_check(*settings);
+    if (settings->service.folder.empty()) {
+      return fail(make_error(mapcodec::ErrorCode::kInvalidArgument,
+                             "--data is needed, or storage.folder in --config"));
+    }
+    return line.verb ? line.verb(*settings) : serve(*settings);
+  } catch (const std::exception& e) {
+    return fail(make_error(mapcodec::ErrorCode::kLimitExceeded, e.what()));
+  }
 }

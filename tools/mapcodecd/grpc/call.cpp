@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "tools/mapcodecd/grpc/call.hpp"
 
+#include <grpc/grpc_security_constants.h>
+
 #include "maps/service/error_names.hpp"
+#include "maps/service/tokens.hpp"
 
 namespace mapcodec::daemon {
 namespace {
@@ -41,26 +44,20 @@ grpc::StatusCode code_of(ErrorCode code) {
 }
 
 const char* name_of(grpc::StatusCode code) {
-  constexpr const char* kNames[] = {"OK", "CANCELLED", "UNKNOWN", "INVALID_ARGUMENT", "DEADLINE_EXCEEDED",
-                                    "NOT_FOUND", "ALREADY_EXISTS", "PERMISSION_DENIED", "RESOURCE_EXHAUSTED",
-                                    "FAILED_PRECONDITION", "ABORTED", "OUT_OF_RANGE", "UNIMPLEMENTED",
-                                    "INTERNAL", "UNAVAILABLE", "DATA_LOSS", "UNAUTHENTICATED"};
+  constexpr const char* kNames[] = {
+      "OK",        "CANCELLED",      "UNKNOWN",           "INVALID_ARGUMENT",   "DEADLINE_EXCEEDED",
+      "NOT_FOUND", "ALREADY_EXISTS", "PERMISSION_DENIED", "RESOURCE_EXHAUSTED", "FAILED_PRECONDITION",
+      "ABORTED",   "OUT_OF_RANGE",   "UNIMPLEMENTED",     "INTERNAL",           "UNAVAILABLE",
+      "DATA_LOSS", "UNAUTHENTICATED"};
   const auto i = static_cast<std::size_t>(code);
   return i < std::size(kNames) ? kNames[i] : "UNKNOWN";
 }
 
-std::string bearer_token(const grpc::CallbackServerContext& grpc) {
-  const auto& metadata = grpc.client_metadata();
-  const auto at = metadata.find("authorization");
-  if (at == metadata.end()) return {};
-  const std::string_view value(at->second.data(), at->second.size());
-  constexpr std::string_view kScheme = "Bearer ";
-  const bool bearer = value.size() > kScheme.size() &&
-                      std::equal(kScheme.begin(), kScheme.end(), value.begin(), [](char a, char b) {
-                        return std::tolower(static_cast<unsigned char>(a)) ==
-                               std::tolower(static_cast<unsigned char>(b));
-                      });
-  return bearer ? std::string(value.substr(kScheme.size())) : std::string();
+/// The first value of a key of the client's metadata; empty without one.
+std::string_view metadata_value(const grpc::CallbackServerContext& grpc, const char* key) {
+  const auto at = grpc.client_metadata().find(key);
+  return at == grpc.client_metadata().end() ? std::string_view()
+                                            : std::string_view(at->second.data(), at->second.size());
 }
 
 bool is_local(const std::string& peer) {
@@ -72,10 +69,15 @@ bool is_local(const std::string& peer) {
 
 Credentials credentials_of(const grpc::CallbackServerContext& grpc) {
   Credentials who;
-  who.token = bearer_token(grpc);
+  who.token = bearer_token(metadata_value(grpc, "authorization"));
   who.peer = grpc.peer();
-  who.local = is_local(who.peer);
-  if (const auto auth = grpc.auth_context(); auth != nullptr && auth->IsPeerAuthenticated()) {
+  const auto auth = grpc.auth_context();
+  const auto transport = auth == nullptr
+                             ? std::vector<grpc::string_ref>()
+                             : auth->FindPropertyValues(GRPC_TRANSPORT_SECURITY_TYPE_PROPERTY_NAME);
+  const bool secure = !transport.empty() && transport.front() == GRPC_SSL_TRANSPORT_SECURITY_TYPE;
+  who.local = !secure && is_local(who.peer);  // a proxy that speaks TLS to us may stand on this machine
+  if (auth != nullptr && auth->IsPeerAuthenticated()) {
     const auto names = auth->FindPropertyValues("x509_common_name");
     if (!names.empty()) who.peer_subject.assign(names.front().data(), names.front().size());
   }
@@ -98,21 +100,32 @@ const std::string& Call::principal() const {
 
 Status Call::charge_in(std::uint64_t bytes) {
   MAPCODEC_TRY(admission_->charge(bytes));
+  bytes_in_ += bytes;
   context.metrics.add(ServiceMetrics::Counter::bytes_in, double(bytes));
   return {};
 }
 
 Status Call::charge_out(std::uint64_t bytes) {
   MAPCODEC_TRY(admission_->charge(bytes));
+  bytes_out_ += bytes;
   context.metrics.add(ServiceMetrics::Counter::bytes_out, double(bytes));
   return {};
 }
 
+void Call::record(const std::string& code, const Status& s, double seconds) {
+  const std::string id = request_id(metadata_value(rpc, "x-request-id"));
+  rpc.AddTrailingMetadata("x-request-id", id);
+  if (!context.record) return;
+  context.record({id, "grpc", method_, code, admission_ == nullptr ? "" : admission_->principal(), who_.peer,
+                  s.ok() ? "" : s.error().to_string(), bytes_in_, bytes_out_, seconds});
+}
+
 grpc::Status Call::end(const Status& s) {
-  admission_ = nullptr;
   const auto code = s.ok() ? grpc::StatusCode::OK : code_of(s.error().code);
   const double took = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
   context.metrics.request("grpc", method_, name_of(code), took);
+  record(name_of(code), s, took);
+  admission_ = nullptr;
   if (s.ok()) return grpc::Status::OK;
   rpc.AddTrailingMetadata(kErrorKey, std::string(error_name(s.error().code)));
   if (code == grpc::StatusCode::RESOURCE_EXHAUSTED) {

@@ -11,6 +11,7 @@
 #include "maps/service/map_service.hpp"
 #include "maps/service/v1/map_service.grpc.pb.h"
 #include "tools/mapcodecd/grpc/worker_pool.hpp"
+#include "tools/mapcodecd/request_record.hpp"
 #include "tools/mapcodecd/settings.hpp"
 
 namespace mapcodec::daemon {
@@ -56,6 +57,7 @@ struct CallContext {
   WorkerPool& pool;
   StreamList& streams;
   std::atomic<bool>& stopping;
+  RecordRequest record;  ///< may be empty
 };
 
 /// One call from its beginning to its end. Threads: one at a time.
@@ -78,10 +80,13 @@ class Call {
   grpc::CallbackServerContext& rpc;
 
  private:
+  /// Tells the client the number of its call, and the log how it ended.
+  void record(const std::string& code, const Status& s, double seconds);
   const char* method_;
   std::chrono::steady_clock::time_point begin_;
   Credentials who_;
   std::unique_ptr<Admission> admission_;
+  std::uint64_t bytes_in_ = 0, bytes_out_ = 0;
 };
 
 /// Answers in one message, made by a thread of the pool.
@@ -100,8 +105,7 @@ grpc::ServerUnaryReactor* answer(CallContext& context, grpc::CallbackServerConte
     }
     reactor->Finish(call->end(body(*call)));
   };
-  if (s.ok() && !context.pool.try_post(work))
-    s = make_error(ErrorCode::kBusy, "too many calls wait");
+  if (s.ok() && !context.pool.try_post(work)) s = make_error(ErrorCode::kBusy, "too many calls wait");
   if (!s.ok()) reactor->Finish(call->end(s));
   return reactor;
 }
@@ -145,8 +149,8 @@ class ReplyStream : public grpc::ServerWriteReactor<Reply>, public OpenStream {
   }
 
  protected:
-  /// Fills the next answer. @return false: there is none, the stream ends. May be called in any thread, one at
-  /// a time.
+  /// Fills the next answer. @return false: there is none, the stream ends. May be called in any thread, one
+  /// at a time.
   [[nodiscard]] virtual Result<bool> next(Reply& reply) = 0;
   /// `next` takes so little that gRPC's threads may do it.
   void set_light(bool light) { light_ = light; }
@@ -172,7 +176,8 @@ class ReplyStream : public grpc::ServerWriteReactor<Reply>, public OpenStream {
   Call call_;
   Reply reply_;
   bool light_ = false;
-  std::atomic<std::chrono::steady_clock::time_point> waits_since_{std::chrono::steady_clock::time_point::max()};
+  std::atomic<std::chrono::steady_clock::time_point> waits_since_{
+      std::chrono::steady_clock::time_point::max()};
 };
 
 }  // namespace mapcodec::daemon

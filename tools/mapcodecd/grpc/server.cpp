@@ -57,10 +57,10 @@ void set_limits(grpc::ServerBuilder& builder, const GrpcSettings& s) {
 }  // namespace
 
 struct GrpcServer::Impl {
-  Impl(const GrpcSettings& s, MapService& m, AccessControl& a, ServiceMetrics& k)
+  Impl(const GrpcSettings& s, MapService& m, AccessControl& a, ServiceMetrics& k, RecordRequest r)
       : settings(s),
         pool(s.workers, s.waiting_calls),
-        context{settings, m, a, k, pool, streams, stopping},
+        context{settings, m, a, k, pool, streams, stopping, std::move(r)},
         calls(context) {}
 
   Status listen(grpc::ServerBuilder& builder);
@@ -125,7 +125,8 @@ void GrpcServer::Impl::watch_clock() {
 GrpcServer::GrpcServer(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 
 Result<std::unique_ptr<GrpcServer>> GrpcServer::start(const GrpcSettings& settings, MapService& service,
-                                                      AccessControl& access, ServiceMetrics& metrics) {
+                                                      AccessControl& access, ServiceMetrics& metrics,
+                                                      RecordRequest record) {
   static const bool plugins = [] {
     grpc::EnableDefaultHealthCheckService(true);
     grpc::reflection::InitProtoReflectionServerBuilderPlugin();
@@ -133,7 +134,7 @@ Result<std::unique_ptr<GrpcServer>> GrpcServer::start(const GrpcSettings& settin
   }();
   (void)plugins;
   try {
-    auto impl = std::make_unique<Impl>(settings, service, access, metrics);
+    auto impl = std::make_unique<Impl>(settings, service, access, metrics, std::move(record));
     grpc::ServerBuilder builder;
     set_limits(builder, settings);
     // Nobody but us may connect to a socket, from its first moment on.

@@ -9,6 +9,7 @@
 
 #include "maps/service/access.hpp"
 #include "maps/service/map_service.hpp"
+#include "tools/mapcodecd/request_record.hpp"
 #include "tools/mapcodecd/settings.hpp"
 
 namespace mapcodec::daemon {
@@ -21,7 +22,8 @@ class GrpcServer {
   /// CannotWrite (address in use).
   [[nodiscard]] static Result<std::unique_ptr<GrpcServer>> start(const GrpcSettings& settings,
                                                                  MapService& service, AccessControl& access,
-                                                                 ServiceMetrics& metrics);
+                                                                 ServiceMetrics& metrics,
+                                                                 RecordRequest record = {});
   ~GrpcServer();
 
   /// What was bound, ports filled in.
