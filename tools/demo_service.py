@@ -53,7 +53,7 @@ class ServiceDemo:
 
     def start_daemon(self):
         ports = self.folder / "ports"
-        process = self.start(self.daemon, "--data", self.folder / "maps", "--listen", "127.0.0.1:0", "--port-file", ports,
+        process = self.start(self.daemon, "--data", self.folder / "maps", "--listen", "127.0.0.1:0", "--http", "127.0.0.1:0", "--port-file", ports,
                              stderr=(self.folder / "mapcodecd.log").open("w"))
         while not ports.exists():
             if process.poll() is not None:

@@ -25,7 +25,7 @@ class Daemon:
 
     def __init__(self, data, *arguments, listen="127.0.0.1:0", **options):
         self.port_file = Path(data).parent / f"ports-{time.monotonic_ns()}"
-        command = [DAEMON, "--data", data, "--port-file", self.port_file, "--listen", listen, *arguments]
+        command = [DAEMON, "--data", data, "--port-file", self.port_file, "--listen", listen, "--http", "127.0.0.1:0", *arguments]
         self.log = tempfile.TemporaryFile()
         self.process = subprocess.Popen([str(c) for c in command], stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
                                         stderr=self.log, **options)

@@ -9,11 +9,15 @@
 #include <fstream>
 #include <sstream>
 
-#include "tools/mapcodecd/grpc/listen.hpp"
+#include "tools/mapcodecd/config/listen_address.hpp"
 #include "tools/mapcodecd/grpc/map_calls.hpp"
 
 namespace mapcodec::daemon {
 namespace {
+
+bool is_socket(const ListenAddress& a) {
+  return a.kind == ListenAddress::Kind::unix_socket;
+}
 
 Result<std::string> read_pem(const std::string& path) {
   std::ifstream in(path, std::ios::binary);
@@ -25,8 +29,8 @@ Result<std::string> read_pem(const std::string& path) {
   return text.str();
 }
 
-Result<std::shared_ptr<grpc::ServerCredentials>> credentials_for(const Address& address, const TlsSettings& tls) {
-  if (address.is_socket() || !tls.enabled()) return grpc::InsecureServerCredentials();
+Result<std::shared_ptr<grpc::ServerCredentials>> credentials_for(const ListenAddress& address, const TlsSettings& tls) {
+  if (is_socket(address) || !tls.enabled()) return grpc::InsecureServerCredentials();
   grpc::SslServerCredentialsOptions options(GRPC_SSL_DONT_REQUEST_CLIENT_CERTIFICATE);
   grpc::SslServerCredentialsOptions::PemKeyCertPair pair;
   MAPCODEC_ASSIGN(pair.private_key, read_pem(tls.key_file));
@@ -73,7 +77,7 @@ struct GrpcServer::Impl {
   WorkerPool pool;
   CallContext context;
   MapCalls calls;
-  std::vector<Address> asked;
+  std::vector<ListenAddress> asked;
   std::vector<int> ports;
   std::vector<std::string> addresses;
   std::unique_ptr<grpc::Server> server;
@@ -85,10 +89,10 @@ struct GrpcServer::Impl {
 
 Status GrpcServer::Impl::listen(grpc::ServerBuilder& builder) {
   for (const std::string& text : settings.listen) {
-    MAPCODEC_ASSIGN(const Address address, parse_address(text));
-    MAPCODEC_TRY(check_plain(address, settings.tls, settings.insecure));
+    MAPCODEC_ASSIGN(const ListenAddress address, parse_listen_address(text));
+    MAPCODEC_TRY(check_listen(address, settings.tls.enabled(), settings.insecure));
     MAPCODEC_ASSIGN(const auto credentials, credentials_for(address, settings.tls));
-    if (address.is_socket()) ::unlink(address.socket_path.c_str());
+    if (is_socket(address)) ::unlink(address.path.c_str());
     asked.push_back(address);
   }
   ports.assign(asked.size(), 0);
@@ -101,15 +105,16 @@ Status GrpcServer::Impl::listen(grpc::ServerBuilder& builder) {
 
 Status GrpcServer::Impl::name_addresses() {
   for (std::size_t i = 0; i < asked.size(); ++i) {
-    if (asked[i].is_socket()) {
+    if (is_socket(asked[i])) {
       addresses.push_back(settings.listen[i]);
-      if (::chmod(asked[i].socket_path.c_str(), 0600) != 0)
-        return make_error(ErrorCode::kCannotWrite, asked[i].socket_path + ": cannot be made private");
+      if (::chmod(asked[i].path.c_str(), 0600) != 0)
+        return make_error(ErrorCode::kCannotWrite, asked[i].path + ": cannot be made private");
       continue;
     }
     if (ports[i] == 0) return make_error(ErrorCode::kCannotWrite, settings.listen[i] + ": cannot be bound");
-    const bool v6 = asked[i].host.find(':') != std::string::npos;
-    addresses.push_back((v6 ? "[" + asked[i].host + "]" : asked[i].host) + ":" + std::to_string(ports[i]));
+    ListenAddress bound = asked[i];
+    bound.port = static_cast<std::uint16_t>(ports[i]);
+    addresses.push_back(bound.to_string());
   }
   return {};
 }
@@ -178,8 +183,8 @@ void GrpcServer::stop(std::chrono::system_clock::time_point deadline) {
   }
   impl_->wake.notify_one();
   impl_->clock.join();
-  for (const Address& a : impl_->asked) {
-    if (a.is_socket()) ::unlink(a.socket_path.c_str());
+  for (const ListenAddress& a : impl_->asked) {
+    if (is_socket(a)) ::unlink(a.path.c_str());
   }
 }
 
