@@ -128,7 +128,9 @@ TEST_F(ServiceMaps, AFullQueueSaysBusyAndDoesNotGrow) {
   int busy = 0;
   for (unsigned i = 0; i < 20; ++i) {
     const Status s = service_->insert("m", scan_of(i), [&](const Result<ScanReceipt>&) { ++done; });
-    if (!s.ok()) EXPECT_EQ(s.error().code, ErrorCode::kBusy);
+    if (!s.ok()) {
+      EXPECT_EQ(s.error().code, ErrorCode::kBusy);
+    }
     busy += !s.ok();
     EXPECT_LE(service_->stats().queued_points, 6000u);
   }
