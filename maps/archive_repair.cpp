@@ -4,6 +4,7 @@
 
 #include "maps/compaction.hpp"
 #include "maps/file_store.hpp"
+#include "maps/store_schemes.hpp"
 #include "maps/flip_correction.hpp"
 #include "maps/map_archive.hpp"
 #include "maps/metadata_codec.hpp"
@@ -185,7 +186,7 @@ Result<RepairReport> repair_archive(const TileStore& store, TileStore& out) {
 }
 
 Result<RepairReport> repair_archive(const std::string& path, const std::string& output, bool overwrite) {
-  MAPCODEC_ASSIGN(const std::unique_ptr<FileStore> store, FileStore::open_for_reading(path));
+  MAPCODEC_ASSIGN(const std::unique_ptr<TileStore> store, open_store(path));
   MAPCODEC_TRY(check_output(path, output));
   MAPCODEC_ASSIGN(const std::unique_ptr<FileStore> out, FileStore::create(output, overwrite));
   return repair_archive(*store, *out);

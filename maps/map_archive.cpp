@@ -6,14 +6,14 @@
 
 #include "mapcodec/base/crc32c.hpp"
 #include "maps/archive_state.hpp"
-#include "maps/file_store.hpp"
+#include "maps/store_schemes.hpp"
 #include "maps/submap_pose.hpp"
 
 namespace mapcodec {
 
 Result<MapArchive> MapArchive::open(const std::string& path, std::optional<std::uint64_t> revision,
                                     const DecodeLimits& limits) {
-  MAPCODEC_ASSIGN(std::unique_ptr<TileStore> store, FileStore::open_for_reading(path));
+  MAPCODEC_ASSIGN(std::unique_ptr<TileStore> store, open_store(path));
   return open(std::move(store), revision, limits);
 }
 

@@ -83,6 +83,8 @@ class MapArchive {
   /// True if both are revisions of one opened file (see `at`): segments with equal places are equal.
   [[nodiscard]] bool shares_store(const MapArchive& other) const { return store_ == other.store_; }
 
+  /// What the archive is read from: for those who hand its bytes on as they lie.
+  [[nodiscard]] const TileStore& store() const { return *store_; }
   /// Bytes read from the store since opening, the opening included.
   [[nodiscard]] std::uint64_t bytes_read() const { return store_->bytes_read(); }
   /// Size of the file up to the end of the newest whole commit at opening.

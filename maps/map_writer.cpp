@@ -2,6 +2,7 @@
 #include "maps/map_writer.hpp"
 
 #include <algorithm>
+#include <limits>
 
 #include "mapcodec/base/crc32c.hpp"
 #include "maps/file_store.hpp"
@@ -113,6 +114,13 @@ std::size_t MapWriter::tile_count() const {
 std::uint64_t MapWriter::revision() const {
   return state_->last.record.revision;
 }
+Status MapWriter::number_next(std::uint64_t number) {
+  if (number <= revision() || number > std::numeric_limits<std::uint32_t>::max())
+    return invalid("revisions have ascending numbers of 32 bits");
+  state_->next_revision = number;
+  return {};
+}
+
 void MapWriter::store_hashes(bool store) {
   state_->hashes = store;
 }

@@ -82,6 +82,9 @@ class MapWriter {
   /// Errors: NotFound (no such revision, or compaction dropped it), InvalidArgument (changes not committed),
   /// ArchiveDamaged, Unreadable.
   [[nodiscard]] Status restore(std::uint64_t revision);
+  /// The next commit gets this number: for copies of other archives, whose revisions keep their names.
+  /// Errors: InvalidArgument (not above the last one, or beyond 32 bits).
+  [[nodiscard]] Status number_next(std::uint64_t revision);
   /// From now on indexes store content hashes, as far as those of all their segments are known; archives that
   /// have them keep them without asking. Compaction fills in the missing ones.
   void store_hashes(bool store);

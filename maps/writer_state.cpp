@@ -160,7 +160,7 @@ Result<CommitRecord> WriterState::make_record(std::int64_t timestamp_s, std::siz
   return CommitRecord{false,
                       timestamp_s,
                       last.offset,
-                      last.record.revision + 1,
+                      static_cast<std::uint32_t>(next_revision > 0 ? next_revision : last.record.revision + 1),
                       static_cast<std::uint32_t>(index_bytes),
                       static_cast<std::uint32_t>(head_bytes - index_bytes)};
 }
@@ -196,6 +196,7 @@ void WriterState::advance(const CommitRecord& record, std::uint64_t offset, bool
   last.delta_index_bytes = delta ? last.delta_index_bytes + record.index_bytes : 0;
   last.deltas = delta ? last.deltas + 1 : 0;
   begin = waypoint = offset + kRecordBytes;
+  next_revision = 0;
   changed.clear();
   dead.clear();
 }

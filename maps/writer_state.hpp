@@ -21,6 +21,7 @@ struct WriterState {
   std::uint64_t waypoint = 0;          // end of the last record or waypoint
   std::uint64_t points = 0;            // of all tiles; wraps around
   bool hashes = false;                 // store them
+  std::uint64_t next_revision = 0;     // number of the next commit; 0: one more than the last
 
   void resume(ArchiveState state);
   [[nodiscard]] Result<IndexEntry> make_entry(const TileId& id, std::uint64_t tile_points, const Box& bounds,

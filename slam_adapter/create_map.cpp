@@ -73,9 +73,8 @@ Result<MapSchema> schema_for(Survey look, const CompressOptions& options, Arena&
 
 }  // namespace
 
-Result<MapUpdater> create_map(const std::string& path, PointSource& first, const CompressOptions& options,
-                              Arena& arena, const UpdateSettings& settings,
-                              std::vector<std::string>& warnings) {
+Result<MapSchema> schema_for_growth(PointSource& first, const CompressOptions& options, Arena& arena,
+                                    const std::string& path, std::vector<std::string>& warnings) {
   MAPCODEC_TRY(check(options));
   SurveySettings survey_settings;
   survey_settings.arena = &arena;
@@ -85,8 +84,13 @@ Result<MapUpdater> create_map(const std::string& path, PointSource& first, const
   if (!options.store_constants)
     std::fill(look.constant_channels.begin(), look.constant_channels.end(), std::nullopt);
   const auto parent = std::filesystem::path(path).parent_path();
-  MAPCODEC_ASSIGN(MapSchema schema, schema_for(std::move(look), options, arena,
-                                               parent.empty() ? "." : parent.string(), warnings));
+  return schema_for(std::move(look), options, arena, parent.empty() ? "." : parent.string(), warnings);
+}
+
+Result<MapUpdater> create_map(const std::string& path, PointSource& first, const CompressOptions& options,
+                              Arena& arena, const UpdateSettings& settings,
+                              std::vector<std::string>& warnings) {
+  MAPCODEC_ASSIGN(MapSchema schema, schema_for_growth(first, options, arena, path, warnings));
   // Tiles of a size that was asked for stay as large as they are.
   const bool splittable = !(options.tile_size_m > 0);
   if (splittable) schema.tile_size_m = std::ldexp(schema.tile_size_m, -kSplits);

@@ -19,4 +19,9 @@ namespace mapcodec {
                                             const UpdateSettings& settings,
                                             std::vector<std::string>& warnings);
 
+/// The schema that such a map would have. @param path  of the archive; nothing is written to it.
+[[nodiscard]] Result<MapSchema> schema_for_growth(PointSource& first, const CompressOptions& options,
+                                                  Arena& arena, const std::string& path,
+                                                  std::vector<std::string>& warnings);
+
 }  // namespace mapcodec

@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "mapcodec/codec/tile_segments.hpp"
+#include "maps/store_schemes.hpp"
 #include "maps/submap_pose.hpp"
 #include "parallel/encode_pipeline.hpp"
 #include "parallel/runner.hpp"
@@ -303,6 +304,7 @@ Status MapFile::read_patches(const Region& region, const ReadSettings& settings,
 }
 
 bool is_map_file(const std::string& path) {
+  if (has_store_scheme(path)) return true;
   char head[4] = {};
   std::ifstream(path, std::ios::binary).read(head, sizeof head);
   return std::string_view(head + 1, 3) == "MPC";

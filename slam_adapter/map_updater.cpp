@@ -124,6 +124,7 @@ struct MapUpdater::State {
   TileErrors achieved;  // of the map, what came in since the last commit included
   std::uint64_t input_points = 0, stored_points = 0, input_bytes = 0;
   bool changed = false;
+  std::map<std::string, Bytes> extras;  // of the next revision
   Status failed;  // the first error that came half way: from then on nothing is committed
 
   Status begin();
@@ -589,6 +590,10 @@ void MapUpdater::add_input_bytes(std::uint64_t bytes) {
   state_->input_bytes += bytes;
 }
 
+void MapUpdater::set_extra(const std::string& name, Bytes value) {
+  state_->extras[name] = std::move(value);
+}
+
 Status MapUpdater::flush() {
   MAPCODEC_TRY(state_->failed);
   return state_->remember(state_->flush());
@@ -614,6 +619,8 @@ Result<UpdateReport> MapUpdater::commit(std::int64_t timestamp_s) {
   info.input_bytes = s.input_bytes;
   info.extras.erase(kLevelsExtra);  // measured on what the map was
   if (s.settings.density_cap && report.points_in > 0) info.extras[kDensityCapExtra] = Bytes{1};
+  for (auto& [name, value] : s.extras) info.extras[name] = std::move(value);
+  s.extras.clear();
   MAPCODEC_TRY(s.writer.set_info(std::move(info)));
   MAPCODEC_ASSIGN(report.revision, s.writer.commit(timestamp_s));
   report.committed = true;

@@ -93,6 +93,8 @@ class MapUpdater {
   [[nodiscard]] Status fold(std::size_t least = 1);
   /// For the record: size of what was inserted.
   void add_input_bytes(std::uint64_t bytes);
+  /// A fact of the next revision (MapInfo::extras); alone it makes none.
+  void set_extra(const std::string& name, Bytes value);
   /// Codes what was inserted. Called as needed.
   [[nodiscard]] Status flush();
 

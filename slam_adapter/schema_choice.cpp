@@ -30,7 +30,7 @@ ChannelSchema choose_channel(const ChannelInfo& info, const std::optional<Bytes>
   c.info = info;
   if (!is_asked(info.name, options.channels)) {
     c.kept = ChannelKept::dropped;
-  } else if (constant) {
+  } else if (constant && options.constants) {
     c.kept = ChannelKept::constant;
     c.constant = *constant;
   } else if (options.promise == PromiseKind::paper && !can_be_bounded_color(info)) {

@@ -3,6 +3,7 @@
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 
+#include "tools/verbs/remote.hpp"
 #include "tools/verbs/report.hpp"
 #include "tools/verbs/verbs.hpp"
 #include "tools/version.hpp"
@@ -51,6 +52,10 @@ int main(int argc, char** argv) {
   add_merge(app, action);
   add_flatten(app, action);
   add_rawlog(app, action);
+#ifdef MAPCODEC_SERVICE
+  add_sync(app, action);
+#endif
+  use_services();
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {

@@ -27,6 +27,10 @@ enum class ErrorCode : std::uint8_t {
   kPromiseBroken,     ///< what was decoded is not what was promised
   kCancelled,         ///< the caller asked to stop
   kUnreachable,       ///< server or store does not answer
+  kBusy,              ///< a queue or a limit is full: the same again later may do
+  kUnauthenticated,   ///< no token, or one that is not known or no longer good
+  kDenied,            ///< known, but without this right
+  kExists,            ///< the name is taken
 };
 
 /// What went wrong, in one sentence without a final stop, and where.

@@ -17,6 +17,7 @@ struct BenchSettings {
   std::vector<std::string> files;  ///< if not empty: only clouds whose path contains one of these
   bool quick = false;              ///< few clouds and bounds: minutes instead of an hour
   std::function<void(const std::string&)> say = [](const std::string&) {};  ///< told what is being measured
+  double minutes = 5;        ///< bench_service: of the mixed load
   bool goals_alone = false;  ///< bench_surface: only the clouds with goals, at these
   std::function<void(const std::string&)> print = [](const std::string&) {
   };  ///< lines of tables, as they come
@@ -53,5 +54,8 @@ struct BenchSettings {
 /// Octrees (.bt, .ot) and OctoMap's scan.dat: size beside zstd, time beside OctoMap, leaf by leaf the same, and a box
 /// out of a large map (octomap.json, octomap.md). Errors: also PromiseBroken (a leaf differs); Unsupported (no OctoMap).
 [[nodiscard]] Status bench_octomap(const BenchSettings& settings);
+/// A mapcodecd under load: tiles beside a bare gRPC stream, copies that follow, writers and readers, memory
+/// over minutes (service.json, service.md, service_soak.png). There where the service is built.
+[[nodiscard]] Status bench_service(const BenchSettings& settings);
 
 }  // namespace mapcodec

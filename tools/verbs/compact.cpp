@@ -7,6 +7,7 @@
 
 #include "slam_adapter/map_updater.hpp"
 #include "tools/verbs/history.hpp"
+#include "tools/verbs/remote.hpp"
 #include "tools/verbs/verbs.hpp"
 
 namespace mapcodec::cli {
@@ -53,10 +54,10 @@ Result<std::uint64_t> fold_pending(const Arguments& a) {
 }
 
 int run(const Arguments& a) {
-  const auto folded = fold_pending(a);
+  const auto folded = is_remote(a.map) ? Result<std::uint64_t>(0) : fold_pending(a);
   // A map by the paper's method has nothing to fold.
   if (!folded.ok() && folded.error().code != ErrorCode::kUnsupported) return fail(a.map, folded.error());
-  auto r = compact_archive(a.map, settings_of(a));
+  auto r = is_remote(a.map) ? compact_remote(a.map, a.keep_last) : compact_archive(a.map, settings_of(a));
   if (!r.ok()) return fail(a.map, r.error());
   r->folded_tiles += folded.ok() ? *folded : 0;
   if (a.json) {

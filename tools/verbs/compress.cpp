@@ -7,6 +7,7 @@
 #include <memory>
 
 #include "tools/verbs/bag_flags.hpp"
+#include "tools/verbs/remote.hpp"
 #include "tools/verbs/report.hpp"
 #include "tools/verbs/verbs.hpp"
 
@@ -173,7 +174,8 @@ Json report_json(const MapFile& map, const CompressReport& r) {
 int run(Arguments& a) {
   if (const Status s = complete(a); !s.ok()) return fail("compress", s.error());
   a.options.progress = progress_printer(a.progress);
-  const auto report = compress_files(a.inputs, a.output, a.options);
+  const auto report = is_remote(a.output) ? compress_remote(a.inputs, a.output, a.options)
+                                             : compress_files(a.inputs, a.output, a.options);
   a.options.progress = {};
   if (!report.ok()) {
     const bool output = report.error().code == ErrorCode::kCannotWrite;

@@ -5,6 +5,7 @@
 #include "slam_adapter/update.hpp"
 #include "tools/verbs/change.hpp"
 #include "tools/verbs/history.hpp"
+#include "tools/verbs/remote.hpp"
 #include "tools/verbs/verbs.hpp"
 
 namespace mapcodec::cli {
@@ -23,7 +24,8 @@ int run(Arguments& a) {
   a.request.settings.stop = stop_flag();
   a.request.timestamp_s = commit_time();
   std::vector<std::string> warnings;
-  const auto report = merge_maps(a.map, a.request, arena, warnings);
+  const auto report = is_remote(a.map) ? merge_remote(a.map, a.request, warnings)
+                                         : merge_maps(a.map, a.request, arena, warnings);
   if (!report.ok()) return fail(a.map, report.error());
   print_change(a.map, *report, warnings,
                std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count(), a.json);

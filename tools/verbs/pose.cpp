@@ -9,6 +9,7 @@
 #include "maps/map_writer.hpp"
 #include "tools/verbs/change.hpp"
 #include "tools/verbs/history.hpp"
+#include "tools/verbs/remote.hpp"
 #include "tools/verbs/verbs.hpp"
 
 namespace mapcodec::cli {
@@ -75,7 +76,7 @@ int run(const Arguments& a) {
     const int code = fail("pose", named.error());
     return a.file.empty() ? int(kUsage) : code;
   }
-  const auto revision = change(a, *named);
+  const auto revision = is_remote(a.map) ? set_poses_remote(a.map, *named) : change(a, *named);
   if (!revision.ok()) return fail(a.map, revision.error());
   if (a.json) {
     fmt::print("{}\n", json_text(Json{{"revision", *revision}, {"poses", named->size()}}));

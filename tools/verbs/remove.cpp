@@ -6,6 +6,7 @@
 #include "slam_adapter/map_updater.hpp"
 #include "tools/verbs/change.hpp"
 #include "tools/verbs/history.hpp"
+#include "tools/verbs/remote.hpp"
 #include "tools/verbs/verbs.hpp"
 
 namespace mapcodec::cli {
@@ -76,7 +77,7 @@ int run(const Arguments& a) {
     return kUsage;
   }
   const auto begin = std::chrono::steady_clock::now();
-  const auto report = change(a, *e);
+  const auto report = is_remote(a.map) ? erase_remote(a.map, *e, a.submap) : change(a, *e);
   if (!report.ok()) return fail(a.map, report.error());
   print_change(a.map, *report, {},
                std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count(), a.json);

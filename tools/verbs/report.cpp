@@ -12,6 +12,7 @@
 #include <cstdio>
 #include <filesystem>
 
+#include "maps/store_schemes.hpp"
 #include "slam_adapter/compress.hpp"
 #include "slam_adapter/formats/formats.hpp"
 
@@ -177,6 +178,7 @@ int exit_code(ErrorCode code) {
     case ErrorCode::kCancelled:
       return kInterrupted;
     case ErrorCode::kUnreachable:
+    case ErrorCode::kBusy:
       return kUnreachable;
     default:
       return kBadInput;
@@ -421,6 +423,7 @@ Result<LoadedCloud> load_any(const std::string& path, Arena& arena) {
   r.bytes = std::filesystem::file_size(path, ignored);
   if (is_map_file(path)) {
     MAPCODEC_ASSIGN(const MapFile map, MapFile::open(path));
+    if (has_store_scheme(path)) r.bytes = map.archive().file_bytes();
     ReadSettings settings;
     settings.arena = &arena;
     settings.stop = stop_flag();

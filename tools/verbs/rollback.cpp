@@ -5,6 +5,7 @@
 
 #include "maps/map_writer.hpp"
 #include "tools/verbs/history.hpp"
+#include "tools/verbs/remote.hpp"
 #include "tools/verbs/verbs.hpp"
 
 namespace mapcodec::cli {
@@ -19,7 +20,17 @@ struct Restored {
   std::uint64_t from = 0, revision = 0, tiles = 0;
 };
 
+Result<Restored> roll_back_remote(const Arguments& a) {
+  Restored r;
+  MAPCODEC_ASSIGN(r.from, resolve_revision(a.map, a.revision));
+  MAPCODEC_ASSIGN(r.revision, rollback_remote(a.map, a.revision));
+  MAPCODEC_ASSIGN(const MapArchive archive, MapArchive::open(a.map, r.revision));
+  r.tiles = archive.tiles().size();
+  return r;
+}
+
 Result<Restored> roll_back(const Arguments& a) {
+  if (is_remote(a.map)) return roll_back_remote(a);
   MAPCODEC_ASSIGN(MapWriter writer, MapWriter::open(a.map));  // first: from here on nobody else changes it
   Restored r;
   {

@@ -7,6 +7,7 @@
 #include "tools/verbs/bag_flags.hpp"
 #include "tools/verbs/change.hpp"
 #include "tools/verbs/history.hpp"
+#include "tools/verbs/remote.hpp"
 #include "tools/verbs/verbs.hpp"
 
 namespace mapcodec::cli {
@@ -55,7 +56,8 @@ int run(Arguments& a) {
   const auto begin = std::chrono::steady_clock::now();
   Arena arena(a.threads);
   std::vector<std::string> warnings;
-  const auto report = update_files(a.map, a.request, arena, warnings);
+  const auto report = is_remote(a.map) ? update_remote(a.map, a.request, warnings)
+                                         : update_files(a.map, a.request, arena, warnings);
   if (!report.ok()) return fail(a.map, report.error());
   print_change(a.map, *report, warnings,
                std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count(), a.json);
