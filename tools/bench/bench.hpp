@@ -43,4 +43,8 @@ struct BenchSettings {
 /// (update.json, update.md). `quick`: a map of 5 instead of 50 million points.
 [[nodiscard]] Status bench_update(const BenchSettings& settings);
 
+/// Rawlogs and simplemaps beside MRPT's own reading of them (mrpt.json, mrpt.md). Needs mrpt_peer beside this
+/// program.
+[[nodiscard]] Status bench_mrpt(const BenchSettings& settings);
+
 }  // namespace mapcodec
