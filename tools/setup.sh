@@ -7,9 +7,10 @@ packages=(
   g++ cmake ninja-build ccache pkg-config                                   # to build
   libtbb-dev libzstd-dev libxxhash-dev libnanoflann-dev libeigen3-dev zlib1g-dev  # libraries
   libcgal-dev libgmp-dev libmpfr-dev libpcl-dev                             # the 2014 paper's encoder, test oracles
+  libmrpt-maps-dev libmrpt-slam-dev                                         # MRPT's files, and programs that use MRPT
   libcli11-dev libspdlog-dev nlohmann-json3-dev libpng-dev                  # the programs
   libdraco-dev gnuplot-nox zstd xz-utils                                    # what the benchmarks compare with and draw
-  libgtest-dev python3                                                      # tests
+  libgtest-dev python3 mrpt-common                                          # tests
 )
 [[ "${1:-}" == fuzz ]] && packages+=(clang-14 libclang-rt-14-dev)
 
