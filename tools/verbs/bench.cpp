@@ -37,6 +37,7 @@ struct Bench {
   std::vector<std::string> reports;  ///< besides its own name
 };
 const std::vector<Bench> kBenches{{"formats", bench_formats, {}}, {"local", bench_local, {}},
+                                  {"mrpt", bench_mrpt, {}},
                                   {"octomap", bench_octomap, {}}, {"paper", bench_paper, {}},
                                   {"rate", bench_rate, {}},       {"scaling", bench_scaling, {}},
                                   {"seams", bench_seams, {}},     {"service", bench_service, {}},
