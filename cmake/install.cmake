@@ -18,6 +18,9 @@ install(FILES ${CMAKE_BINARY_DIR}/mapcodec-config.cmake ${CMAKE_BINARY_DIR}/mapc
 
 if(MAPCODEC_BUILD_TOOLS)
   install(TARGETS mapcodec RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+  if(MAPCODEC_MRPT)
+    install(TARGETS mapcodec-mrpt RUNTIME DESTINATION ${CMAKE_INSTALL_LIBEXECDIR}/mapcodec)
+  endif()
   if(MAPCODEC_SERVICE)
     install(TARGETS mapcodecd RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
   endif()

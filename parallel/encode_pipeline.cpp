@@ -18,13 +18,6 @@ constexpr std::size_t kTilesPerThread = 4;
 /// What an encoder takes for its own arrays, per byte of its tile; the tile itself included.
 constexpr std::uint64_t kBytesPerTileByte = 6;
 
-/// Processor time of this thread: says what a tile costs also on a busy machine.
-double thread_seconds() {
-  timespec t{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
-}
-
 std::size_t default_in_flight(const PipelineSettings& settings) {
   if (settings.max_tiles_in_flight > 0) return settings.max_tiles_in_flight;
   return settings.arena == nullptr ? 1
@@ -176,6 +169,13 @@ class DecodeRun {
 };
 
 }  // namespace
+
+/// Processor time of this thread: says what a tile costs also on a busy machine.
+double thread_seconds() {
+  timespec t{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
+}
 
 std::string tile_name(const TileKey& key) {
   if (key.is_unplaced()) return "tile without position";

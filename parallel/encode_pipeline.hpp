@@ -61,4 +61,7 @@ using DecodedSink = std::function<Status(std::size_t, PointCloud&&)>;
 /// "tile (x, y, z) level l", "tile without position".
 [[nodiscard]] std::string tile_name(const TileKey& key);
 
+/// Processor time of the calling thread [s]: what tile_seconds is measured with.
+[[nodiscard]] double thread_seconds();
+
 }  // namespace mapcodec

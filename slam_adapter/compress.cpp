@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "slam_adapter/compress.hpp"
 
+#include <algorithm>
 #include <filesystem>
 
 #include "slam_adapter/compress_job.hpp"
 #include "slam_adapter/formats/formats.hpp"
+#include "slam_adapter/octomap/octree_jobs.hpp"
 #include "slam_adapter/order_source.hpp"
 #include "slam_adapter/schema_choice.hpp"
 
@@ -44,9 +46,12 @@ Result<CompressReport> compress_files(const std::vector<std::string>& inputs, co
   if (!options.overwrite && std::filesystem::exists(path, ignored)) {
     return make_error(ErrorCode::kCannotWrite, path + ": exists already (--force replaces it)");
   }
+  if (std::all_of(inputs.begin(), inputs.end(), is_octree_file))
+    return compress_octrees(inputs, path, options);
   ReadOptions read;
   read.keep_nonfinite = options.promise == PromiseKind::lossless;
   read.unit_m = options.unit_m;
+  read.bag = options.bag;
   MAPCODEC_ASSIGN(const std::unique_ptr<PointSource> source,
                   open_inputs(inputs, read, options.promise == PromiseKind::lossless));
   for (const std::string& input : inputs) {

@@ -11,6 +11,7 @@
 #include "maps/map_archive.hpp"
 #include "parallel/progress.hpp"
 #include "slam_adapter/coding_plan.hpp"
+#include "slam_adapter/formats/bag_options.hpp"
 
 namespace mapcodec {
 
@@ -29,10 +30,12 @@ struct CompressOptions {
   bool constants = true;  ///< a channel that is the same for all points is stored once, for good
   double tile_size_m = 0;  ///< 0: from the density, 100,000 points a tile, 600,000 of surfaces
   Effort effort = Effort::standard;
-  bool keep_order = false;  ///< lossless: also the order of points
-  bool keep_counts = true;  ///< false: points in one voxel become one
+  bool keep_order = false;      ///< lossless: also the order of points
+  bool store_constants = true;  ///< a channel in which all points are equal is stored once for the map
+  bool keep_counts = true;      ///< false: points in one voxel become one
   PaperSettings paper;
   double unit_m = 1;                   ///< metres per unit of the input files (3DTK's centimetres: 0.01)
+  BagOptions bag;                      ///< of ROS bags among the input files
   int threads = 0;                     ///< 0: all
   std::uint64_t max_memory_bytes = 0;  ///< 0: half of the machine's memory
   std::string temp_folder;             ///< spill files; empty: the output's folder

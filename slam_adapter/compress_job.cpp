@@ -72,6 +72,7 @@ Result<CompressReport> CompressJob::run() {
   report_.tiling_seconds = lap(at);
   MAPCODEC_ASSIGN(choice_, choose_plan(options_, *tiles_, schema_, arena_, report_.warnings));
   report_.search_seconds = lap(at);
+  if (choice_.coded) searched_step_ = choice_.plan.step_m;
   if (const auto color = bounded_color(); color && !has_target() && choice_.plan.has_surfaces())
     color_loss_ = 0.6 * schema_.channels[*color].bound;
   MAPCODEC_TRY(encode_until_kept());
@@ -189,6 +190,8 @@ bool CompressJob::meets_rms_or_adjust() {
     plan.step_m = position_step_;
     return false;
   }
+  // The search has tried around it on the whole map.
+  if (plan.step_m == searched_step_ && rms <= promise) return true;
   // A step of the map's size loses all it can; and colour may ask for finer steps than the positions.
   const bool can_be_coarser =
       plan.step_m < 4 * std::max(choice_.side_m, promise) && color_tries_ == 0 && rms_tries_ < 3;
@@ -317,11 +320,29 @@ Status CompressJob::encode_once() {
   pipeline.progress = options_.progress;
   pipeline.stop = options_.stop;
   pipeline.tile_seconds = &report_.tile_seconds;
+  if (is_coded()) return store_coded();
   MapSchema target = schema_;
   if (const auto color = bounded_color()) target.channels[*color].bound *= color_target_;
   return encode_tiles(
       *tiles_, [&](const PointCloud& tile) { return encode(tile, target); }, pipeline,
       [this](const TileKey& key, EncodedTile&& t) { return store(key, std::move(t)); });
+}
+
+/// Whether the search has coded the whole map already: positions are all of it, and it was not coded since.
+bool CompressJob::is_coded() const {
+  const auto dropped = [](const ChannelSchema& c) { return c.kept == ChannelKept::dropped; };
+  return report_.codings == 0 && choice_.coded && choice_.coded->tiles.size() == tiles_->tiles().size() &&
+         std::all_of(schema_.channels.begin(), schema_.channels.end(), dropped);
+}
+
+Status CompressJob::store_coded() {
+  for (std::size_t i = 0; i < tiles_->tiles().size(); ++i)
+    MAPCODEC_TRY(store(tiles_->tiles()[i].key, std::move(choice_.coded->tiles[i])));
+  report_.tile_seconds = choice_.coded->seconds;
+  if (options_.progress)
+    options_.progress({"encode", survey_.points, survey_.points, report_.geometry_bytes});
+  choice_.coded.reset();
+  return {};
 }
 
 /// Later codings keep to the codecs of the first: with a little other step some tiles would change over, and

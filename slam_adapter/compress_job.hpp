@@ -35,6 +35,8 @@ class CompressJob {
   [[nodiscard]] Status encode_until_kept();
   [[nodiscard]] Status encode_once();
   [[nodiscard]] Result<EncodedTile> encode(const PointCloud& tile, const MapSchema& target) const;
+  [[nodiscard]] bool is_coded() const;
+  [[nodiscard]] Status store_coded();
   [[nodiscard]] Status store(const TileKey& key, EncodedTile&& t);
   [[nodiscard]] Status commit();
 
@@ -65,6 +67,7 @@ class CompressJob {
   std::map<TileKey, CodecId, MortonLess> codecs_;  // of the tiles, as the first coding chose them
   Box bounds_;
   double position_step_ = 0;                     // what the positions' promise alone would allow
+  double searched_step_ = 0;                     // where the search ended on the whole map; 0: it did not
   double best_step_ = 0, best_bits_ = INFINITY;  // of the codings that kept the promise, the smallest
   std::optional<LogSecant> secant_;              // over the codings of the whole map
   int target_tries_ = 0, rms_tries_ = 0, color_tries_ = 0;

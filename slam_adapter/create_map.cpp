@@ -8,6 +8,7 @@
 #include "parallel/survey.hpp"
 #include "slam_adapter/plan_choice.hpp"
 #include "slam_adapter/schema_choice.hpp"
+#include "slam_adapter/split_tile.hpp"
 
 namespace mapcodec {
 namespace {
@@ -16,6 +17,9 @@ namespace {
 constexpr double kScanPoints = 50000;
 // As compress does: surfaces take so few bits that what begins anew with each tile weighs more.
 constexpr double kSurfaceScanPoints = 300000;
+
+/// So often can a tile be halved along each axis, where later scans fill it far beyond the others.
+constexpr std::uint8_t kSplits = 3;
 
 /// The size of tile that most points of the plan have: a map that grows has tiles of one size.
 double usual_size(const TilePlan& plan) {
@@ -77,6 +81,8 @@ Result<MapSchema> schema_for_growth(PointSource& first, const CompressOptions& o
   survey_settings.stop = options.stop;
   if (options.max_memory_bytes > 0) survey_settings.memory_budget_bytes = options.max_memory_bytes;
   MAPCODEC_ASSIGN(Survey look, survey(first, survey_settings));
+  if (!options.store_constants)
+    std::fill(look.constant_channels.begin(), look.constant_channels.end(), std::nullopt);
   const auto parent = std::filesystem::path(path).parent_path();
   return schema_for(std::move(look), options, arena, parent.empty() ? "." : parent.string(), warnings);
 }
@@ -84,9 +90,13 @@ Result<MapSchema> schema_for_growth(PointSource& first, const CompressOptions& o
 Result<MapUpdater> create_map(const std::string& path, PointSource& first, const CompressOptions& options,
                               Arena& arena, const UpdateSettings& settings,
                               std::vector<std::string>& warnings) {
-  MAPCODEC_ASSIGN(const MapSchema schema, schema_for_growth(first, options, arena, path, warnings));
+  MAPCODEC_ASSIGN(MapSchema schema, schema_for_growth(first, options, arena, path, warnings));
+  // Tiles of a size that was asked for stay as large as they are.
+  const bool splittable = !(options.tile_size_m > 0);
+  if (splittable) schema.tile_size_m = std::ldexp(schema.tile_size_m, -kSplits);
   MapInfo info;
   info.schema = write_schema(schema);
+  if (splittable) info.extras[kNewTileLevelExtra] = Bytes{kSplits};
   info.origin = schema.origin;
   info.tile_size_m = schema.tile_size_m;
   MAPCODEC_ASSIGN(MapWriter writer, MapWriter::create(path, info, options.overwrite));

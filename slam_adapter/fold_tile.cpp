@@ -4,16 +4,19 @@
 #include <algorithm>
 #include <cmath>
 
+#include "mapcodec/geometry/quantizer.hpp"
 #include "mapcodec/quality/novelty.hpp"
 #include "slam_adapter/coding_plan.hpp"
 #include "slam_adapter/log_secant.hpp"
+#include "slam_adapter/point_batch.hpp"
 
 namespace mapcodec {
 namespace {
 
-// Pending positions have a quarter of the promise: what folding may add is then nearly all of it, since the
-// two errors are independent: 0.25^2 + 0.95^2 < 1.
-constexpr double kPendingRms = 0.25;
+// Pending positions have so much less than the promise that folding may add nearly all of it, since the two
+// errors are independent: 0.15^2 + 0.98^2 < 1. (A quarter would save two bits a point until folding, and cost
+// a twentieth of the size for good.)
+constexpr double kPendingRms = 0.15;
 // Colour errors are mean distances: they add up.
 constexpr double kPendingColor = 0.3, kFoldedColor = 0.7;
 // A uniform cell's root mean square distance from its centre, in sides.
@@ -29,12 +32,6 @@ ChannelSchema* bounded_color(MapSchema& schema) {
 MapSchema with_color_share(MapSchema schema, double share) {
   if (ChannelSchema* color = bounded_color(schema)) color->bound *= share;
   return schema;
-}
-
-/// Whether decoding all and encoding it again changes nothing that decodes.
-bool is_exact_again(MapSchema schema) {
-  return schema.promise == PromiseKind::lossless ||
-         (schema.promise == PromiseKind::max_error && bounded_color(schema) == nullptr);
 }
 
 /// Dropped channels are gone; encoders want them in their places all the same.
@@ -111,21 +108,6 @@ class TileForRms {
   std::optional<std::size_t> best_;
 };
 
-Result<EncodedTile> encode_for_good(const PointCloud& tile, const MapSchema& schema, bool with_pending) {
-  TileSettings s;
-  switch (schema.promise) {
-    case PromiseKind::lossless:
-      s.codec = CodecId::lossless;
-      return encode_tile(tile, schema, s);
-    case PromiseKind::rms: {
-      const MapSchema target = with_color_share(schema, with_pending ? kFoldedColor : 1);
-      return TileForRms(tile, target, (with_pending ? kFoldedShare : 1) * schema.promise_value).encode();
-    }
-    default:
-      return encode_tile(tile, with_color_share(schema, with_pending ? kFoldedColor : 1), s);
-  }
-}
-
 /// A tile's segments, sorted into what stays and what is coded again.
 struct Parts {
   std::vector<Bytes> kept;            ///< folded before, and erasures that concern them
@@ -156,13 +138,46 @@ struct Parts {
   }
 };
 
+}  // namespace
+
+bool has_bounded_color(const MapSchema& schema) {
+  MapSchema copy = schema;
+  return bounded_color(copy) != nullptr;
+}
+
+bool is_exact_again(const MapSchema& schema) {
+  return schema.promise == PromiseKind::lossless ||
+         (schema.promise == PromiseKind::max_error && !has_bounded_color(schema));
+}
+
+Result<EncodedTile> encode_for_good(PointCloud points, const MapSchema& schema, bool from_pending) {
+  const PointCloud tile = with_all_channels(std::move(points), schema);
+  TileSettings s;
+  switch (schema.promise) {
+    case PromiseKind::lossless:
+      s.codec = CodecId::lossless;
+      return encode_tile(tile, schema, s);
+    case PromiseKind::rms: {
+      const MapSchema target = with_color_share(schema, from_pending ? kFoldedColor : 1);
+      return TileForRms(tile, target, (from_pending ? kFoldedShare : 1) * schema.promise_value).encode();
+    }
+    default:
+      return encode_tile(tile, with_color_share(schema, from_pending ? kFoldedColor : 1), s);
+  }
+}
+
+Result<EncodedTile> encode_pending(PointCloud points, const MapSchema& schema, const PendingCoding& coding) {
+  MAPCODEC_ASSIGN(EncodedTile t,
+                  encode_tile(with_all_channels(std::move(points), schema), coding.schema, coding.tiles));
+  mark_pending(t.bytes);
+  return t;
+}
+
 TileErrors joint_errors(const TileErrors& tile, const TileErrors& again, double share) {
   return {std::sqrt(tile.rms_m * tile.rms_m + share * again.rms_m * again.rms_m),
           tile.max_axis_error_m + again.max_axis_error_m, tile.color_error + share * again.color_error,
           tile.density_error + share * again.density_error};
 }
-
-}  // namespace
 
 Result<PendingCoding> pending_coding(const MapSchema& schema, Effort effort) {
   PendingCoding p;
@@ -186,6 +201,19 @@ Result<PendingCoding> pending_coding(const MapSchema& schema, Effort effort) {
   return p;
 }
 
+PointCloud as_decoded(const PointCloud& points, const MapSchema& schema, const PendingCoding& coding) {
+  if (coding.tiles.codec == CodecId::lossless) return without_dropped(points, schema);
+  const double step_m = coding.tiles.step_m > 0 ? coding.tiles.step_m : schema.step_m;
+  const Quantizer lattice{schema.origin, step_m, schema.coordinates.kind};
+  PointCloud decoded;
+  decoded.xyz.reserve(points.size());
+  for (const Vec3& p : points.xyz) {
+    Vec3& q = decoded.xyz.emplace_back();
+    for (std::size_t d = 0; d < 3; ++d) q[d] = lattice.centre(lattice.lattice(p[d], d), d);
+  }
+  return decoded;
+}
+
 Result<std::optional<Fold>> fold_tile(const std::vector<Bytes>& segments, const MapSchema& schema,
                                       const TileErrors& errors, const Box& bounds) {
   const Bytes joined = join_segments(segments);
@@ -200,8 +228,7 @@ Result<std::optional<Fold>> fold_tile(const std::vector<Bytes>& segments, const 
   TileErrors again;
   double coded = 0;
   if (parts.pending && !parts.pending->empty()) {
-    const PointCloud cloud = with_all_channels(std::move(*parts.pending), schema);
-    MAPCODEC_ASSIGN(EncodedTile t, encode_for_good(cloud, schema, parts.any_pending));
+    MAPCODEC_ASSIGN(EncodedTile t, encode_for_good(std::move(*parts.pending), schema, parts.any_pending));
     fold.bounds.add(t.bounds);
     parts.kept.push_back(std::move(t.bytes));
     again = t.errors;

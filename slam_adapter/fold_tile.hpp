@@ -20,6 +20,12 @@ struct PendingCoding {
 /// Errors: Unsupported (a map by the paper's method).
 [[nodiscard]] Result<PendingCoding> pending_coding(const MapSchema& schema, Effort effort);
 
+/// What a pending segment of `points` decodes to, in another order: without coding it, and without the
+/// channels that novelty does not look at.
+/// @param schema  of the map.
+[[nodiscard]] PointCloud as_decoded(const PointCloud& points, const MapSchema& schema,
+                                    const PendingCoding& coding);
+
 /// A tile's content after folding.
 struct Fold {
   std::uint8_t codec = 0;  ///< first byte of `bytes`
@@ -38,5 +44,21 @@ struct Fold {
 [[nodiscard]] Result<std::optional<Fold>> fold_tile(const std::vector<Bytes>& segments,
                                                     const MapSchema& schema, const TileErrors& errors,
                                                     const Box& bounds);
+
+/// Codes points of one tile for good: the cheapest coding within the promise, or what of it pending ones
+/// leave.
+/// @param points  laid out as what a tile of `schema` decodes to. @param from_pending  they were coded
+/// before. Errors: those of encoding; PromiseBroken.
+[[nodiscard]] Result<EncodedTile> encode_for_good(PointCloud points, const MapSchema& schema,
+                                                  bool from_pending);
+/// The same as one more pending segment: nothing is lost that was not lost before, where colours are exact.
+[[nodiscard]] Result<EncodedTile> encode_pending(PointCloud points, const MapSchema& schema,
+                                                 const PendingCoding& coding);
+/// Whether decoding a folded tile and encoding it again changes nothing that decodes.
+[[nodiscard]] bool is_exact_again(const MapSchema& schema);
+/// Whether colours are kept within a bound: then each coding moves them.
+[[nodiscard]] bool has_bounded_color(const MapSchema& schema);
+/// Of a tile of which a share was coded again, each with its own error.
+[[nodiscard]] TileErrors joint_errors(const TileErrors& tile, const TileErrors& again, double share);
 
 }  // namespace mapcodec

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "slam_adapter/local_map_builder.hpp"
+#include "slam_adapter/octomap/octree_layer.hpp"
 
 #include <algorithm>
 
@@ -36,7 +37,9 @@ Result<std::shared_ptr<const MapRevision>> read_revision(std::shared_ptr<const M
   r->schema = std::move(schema).value();
   const MapInfo& info = r->archive->info();
   for (std::uint32_t s = 0; s < info.submaps.size(); ++s) r->motions.push_back(pose_of(info, s));
-  for (const TileRecord& t : r->archive->tiles()) r->boxes.push_back(r->motion(t.submap).apply(t.bounds));
+  const auto octree = octree_submap(info);  // nowhere, for points
+  for (const TileRecord& t : r->archive->tiles())
+    r->boxes.push_back(t.submap == octree ? Box{} : r->motion(t.submap).apply(t.bounds));
   return std::shared_ptr<const MapRevision>(std::move(r));
 }
 

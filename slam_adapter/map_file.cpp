@@ -11,6 +11,7 @@
 #include "parallel/encode_pipeline.hpp"
 #include "parallel/runner.hpp"
 #include "slam_adapter/compress.hpp"
+#include "slam_adapter/octomap/octree_layer.hpp"
 
 namespace mapcodec {
 namespace {
@@ -106,12 +107,13 @@ Result<MapFile> MapFile::open(const std::string& path, std::optional<std::uint64
 MapSummary MapFile::summary() const {
   MapSummary s;
   s.tiles = archive_->tiles().size();
+  const auto octree = octree_submap(archive_->info());
   for (const TileRecord& t : archive_->tiles()) {
     MapSummary::CodecTotals& c = s.codecs[codec_name(static_cast<CodecId>(t.codec))];
     c.tiles += 1;
     c.points += t.points;
     for (const SegmentRef& segment : t.segments) c.bytes += segment.length;
-    s.points += t.points;
+    if (t.submap != octree) s.points += t.points;
   }
   const MapInfo& info = archive_->info();
   s.bytes = archive_->file_bytes();
@@ -132,12 +134,14 @@ MapSummary MapFile::summary() const {
 }
 
 std::vector<std::size_t> MapFile::tiles_in(const Region& region) const {
-  if (region.everything()) {
-    std::vector<std::size_t> all(archive_->tiles().size());
+  std::vector<std::size_t> all(archive_->tiles().size());
+  if (region.everything())
     std::iota(all.begin(), all.end(), std::size_t{0});
-    return all;
-  }
-  return archive_->tiles_in(region.bounds());
+  else
+    all = archive_->tiles_in(region.bounds());
+  if (const auto octree = octree_submap(archive_->info()))
+    std::erase_if(all, [&](std::size_t i) { return archive_->tiles()[i].submap == *octree; });
+  return all;
 }
 
 Result<Bytes> MapFile::fetch(std::size_t index) const {

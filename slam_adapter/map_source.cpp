@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "maps/submap_pose.hpp"
+#include "slam_adapter/octomap/octree_layer.hpp"
 
 namespace mapcodec {
 
@@ -17,14 +18,16 @@ MapSource::MapSource(const MapFile& map) : map_(map), layout_(map.schema().layou
 
 std::optional<std::uint64_t> MapSource::announced_points() const {
   std::uint64_t points = 0;
-  for (const TileRecord& t : map_.archive().tiles()) points += t.points;
+  for (const std::size_t i : map_.tiles_in({})) points += map_.archive().tiles()[i].points;
   return points;
 }
 
 Result<bool> MapSource::next(PointCloud& block) {
   constexpr std::size_t kBlock = 65536;
   while (at_ >= cloud_.size() && tile_ < map_.archive().tiles().size()) {
-    MAPCODEC_ASSIGN(cloud_, map_.read_tile(tile_++));
+    const std::size_t i = tile_++;
+    if (map_.archive().tiles()[i].submap == octree_submap(map_.archive().info())) continue;
+    MAPCODEC_ASSIGN(cloud_, map_.read_tile(i));
     at_ = 0;
   }
   block = layout_;

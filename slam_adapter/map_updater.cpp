@@ -10,7 +10,9 @@
 #include "parallel/runner.hpp"
 #include "slam_adapter/fold_tile.hpp"
 #include "slam_adapter/level_errors.hpp"
+#include "slam_adapter/octomap/octree_layer.hpp"
 #include "slam_adapter/point_batch.hpp"
+#include "slam_adapter/split_tile.hpp"
 #include "slam_adapter/tile_directory.hpp"
 
 namespace mapcodec {
@@ -33,6 +35,7 @@ struct TileWork {
   PointCloud points;                     ///< that came in
   std::shared_ptr<StoredPoints> stored;  ///< known already, or made here
   std::vector<Bytes> segments;           ///< where it is not known
+  bool begins = false;                   ///< the tile had nothing before
   double allowed_rms_m = 0;              ///< that points may have to what stands for them
   Novelty novelty;
   std::optional<EncodedTile> coded;  ///< of what is new
@@ -107,6 +110,7 @@ struct MapUpdater::State {
   MapSchema schema;
   PendingCoding coding;
   std::uint8_t new_level = 0;
+  std::optional<std::uint32_t> octree;  ///< submap whose tiles are no points
   std::map<std::uint32_t, TileDirectory> directories;
   std::vector<std::pair<std::uint32_t, PointCloud>> held;
   std::uint64_t held_points = 0;
@@ -145,6 +149,8 @@ struct MapUpdater::State {
   Result<Erasure> in_submap(const Erasure& e, std::uint32_t submap) const;
   Status fold(std::size_t least);
   Status fold_some(const std::vector<Place>& places);
+  Status split_large(std::vector<Place> places);
+  Result<std::vector<Place>> split_one(const Place& place);
   Status stopped() const {
     return settings.stop != nullptr && *settings.stop ? Status(make_error(ErrorCode::kCancelled, "stopped"))
                                                       : Status{};
@@ -157,8 +163,12 @@ Status MapUpdater::State::begin() {
   achieved = writer.info().achieved;
   input_points = writer.info().input_points;
   input_bytes = writer.info().input_bytes;
-  new_level = usual_level(writer.tiles());
+  const auto level = writer.info().extras.find(kNewTileLevelExtra);
+  const bool has_level = level != writer.info().extras.end() && level->second.size() == 1;
+  new_level = has_level ? std::min(level->second[0], kMaxTileLevel) : usual_level(writer.tiles());
+  octree = octree_submap(writer.info());
   for (const TileRecord* t : writer.tiles()) {
+    if (t->submap == octree) continue;
     directory(t->submap).add(t->key);
     stored_points += t->points;
   }
@@ -220,6 +230,7 @@ Result<TileWork> MapUpdater::State::prepare(const Place& place, PointCloud point
   w.place = place;
   w.points = std::move(points);
   const TileRecord* record = writer.find(place.key, place.submap);
+  w.begins = record == nullptr;
   w.allowed_rms_m = schema.promise_value;
   if (!settings.density_cap || record == nullptr) return w;
   // A tile may have more than the map on the whole, and then its own points coming again are no news.
@@ -258,11 +269,13 @@ Status MapUpdater::State::work_on(TileWork& w) const {
   if (w.novelty.added.empty()) return {};
   const bool all = w.novelty.added.size() == w.points.size();
   const PointCloud some = all ? PointCloud{} : w.points.gather(w.novelty.added);
-  MAPCODEC_ASSIGN(EncodedTile t, encode_tile(all ? w.points : some, coding.schema, coding.tiles));
-  if (w.stored != nullptr) {
-    MAPCODEC_ASSIGN(const PointCloud decoded, decode_tile(t.bytes, schema));
-    w.stored->add(decoded, true);
+  if (settings.for_good && w.begins) {
+    MAPCODEC_ASSIGN(w.coded, encode_for_good(w.points, schema, false));
+    return {};
   }
+  const PointCloud& added = all ? w.points : some;
+  MAPCODEC_ASSIGN(EncodedTile t, encode_tile(added, coding.schema, coding.tiles));
+  if (w.stored != nullptr) w.stored->add(as_decoded(added, schema, coding), true);
   mark_pending(t.bytes);
   w.coded = std::move(t);
   return {};
@@ -330,9 +343,49 @@ Status MapUpdater::State::flush() {
   }
   MAPCODEC_TRY(stopped());
   MAPCODEC_TRY(run_all(work.size(), [&](std::size_t i) { return work_on(work[i]); }));
-  for (TileWork& w : work) MAPCODEC_TRY(store(w));
+  std::vector<Place> touched;
+  for (TileWork& w : work) {
+    MAPCODEC_TRY(store(w));
+    touched.push_back(w.place);
+  }
+  MAPCODEC_TRY(split_large(std::move(touched)));
   trim_cache();
   return stopped();
+}
+
+/// Tiles that grew far beyond the others, and then their parts.
+Status MapUpdater::State::split_large(std::vector<Place> places) {
+  while (!places.empty()) {
+    const Place place = places.back();
+    places.pop_back();
+    const TileRecord* record = writer.find(place.key, place.submap);
+    if (record == nullptr || record->points <= settings.split_points || place.key.level == 0) continue;
+    MAPCODEC_TRY(stopped());
+    MAPCODEC_ASSIGN(const std::vector<Place> parts, split_one(place));
+    places.insert(places.end(), parts.begin(), parts.end());
+  }
+  return {};
+}
+
+Result<std::vector<Place>> MapUpdater::State::split_one(const Place& place) {
+  const TileRecord record = *writer.find(place.key, place.submap);
+  MAPCODEC_ASSIGN(const std::vector<Bytes> segments, read_all(record));
+  MAPCODEC_ASSIGN(const auto parts, split_tile(place.key, segments, schema, coding, record.errors));
+  std::vector<Place> places;
+  if (!parts) return places;
+  cache.erase(place);
+  ++report.tiles_split;
+  MAPCODEC_TRY(writer.remove(place.key, place.submap));
+  TileDirectory& tiles_of = directory(place.submap);
+  tiles_of.split(place.key);
+  for (const TilePart& part : *parts) {
+    tiles_of.add(part.key);
+    report.bytes += part.tile.bytes.size();
+    places.push_back({place.submap, part.key});
+    MAPCODEC_TRY(writer.add(part.key, part.tile.codec, part.tile.points, part.tile.bounds, part.tile.errors,
+                            part.tile.bytes, place.submap));
+  }
+  return places;
 }
 
 Result<Erasure> MapUpdater::State::in_submap(const Erasure& e, std::uint32_t submap) const {
@@ -399,7 +452,7 @@ Status MapUpdater::State::fold_some(const std::vector<Place>& places) {
 Status MapUpdater::State::fold(std::size_t least) {
   std::vector<Place> places;
   for (const TileRecord* t : writer.tiles()) {
-    if (t->segments.size() >= least) places.push_back({t->submap, t->key});
+    if (t->submap != octree && t->segments.size() >= least) places.push_back({t->submap, t->key});
   }
   const std::size_t at_once = 4 * std::size_t(arena.threads());
   for (std::size_t i = 0; i < places.size(); i += at_once) {
@@ -410,6 +463,7 @@ Status MapUpdater::State::fold(std::size_t least) {
   if (report.tiles_folded == 0) return {};
   double points = 0, squares = 0, color = 0;
   for (const TileRecord* t : writer.tiles()) {
+    if (t->submap == octree) continue;
     points += double(t->points);
     squares += double(t->points) * t->errors.rms_m * t->errors.rms_m;
     color += double(t->points) * t->errors.color_error;
@@ -475,6 +529,23 @@ Status MapUpdater::set_poses(std::span<const PoseChange> poses) {
   return {};
 }
 
+Status MapUpdater::set_stamps(std::uint32_t submap, double first_s, double last_s) {
+  MapInfo info = state_->writer.info();
+  if (submap >= info.submaps.size())
+    return make_error(ErrorCode::kInvalidArgument, "there is no such submap");
+  info.submaps[submap].first_stamp_s = first_s;
+  info.submaps[submap].last_stamp_s = last_s;
+  state_->changed = true;
+  return state_->writer.set_info(std::move(info));
+}
+
+Status MapUpdater::set_extra(const std::string& name, Bytes value) {
+  MapInfo info = state_->writer.info();
+  info.extras[name] = std::move(value);
+  state_->changed = true;
+  return state_->writer.set_info(std::move(info));
+}
+
 Status MapUpdater::insert(PointCloud points, std::uint32_t submap) {
   State& s = *state_;
   std::uint64_t dropped = 0;
@@ -489,7 +560,7 @@ Status MapUpdater::insert(PointCloud points, std::uint32_t submap) {
 Status MapUpdater::State::erase(const std::optional<Erasure>& e, std::optional<std::uint32_t> submap) {
   std::vector<Place> places;
   for (const TileRecord* t : writer.tiles()) {
-    if (!submap || t->submap == *submap) places.push_back({t->submap, t->key});
+    if (t->submap != octree && (!submap || t->submap == *submap)) places.push_back({t->submap, t->key});
   }
   for (const Place& p : places) {
     MAPCODEC_TRY(stopped());
@@ -524,7 +595,8 @@ void MapUpdater::set_extra(const std::string& name, Bytes value) {
 }
 
 Status MapUpdater::flush() {
-  return state_->flush();
+  MAPCODEC_TRY(state_->failed);
+  return state_->remember(state_->flush());
 }
 
 Status MapUpdater::fold(std::size_t least) {

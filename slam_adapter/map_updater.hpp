@@ -23,7 +23,13 @@ struct UpdateSettings {
   /// What lies on stored surfaces within the promise, at the density already reached, adds nothing.
   bool density_cap = true;
   Effort effort = Effort::fast;  ///< of pending segments
+  /// What begins a tile is coded once, with the whole promise, instead of quickly and pending: for points to
+  /// which nothing will be added, as those of a keyframe.
+  bool for_good = false;
   std::size_t fold_after = 24;   ///< pending segments of a tile at which the next commit folds it; 0: never
+  /// A tile of more points becomes up to eight smaller ones, where the map has smaller ones and no point
+  /// would be coded with loss more than twice.
+  std::uint64_t split_points = std::uint64_t{1} << 20;
   std::uint64_t cache_bytes = std::uint64_t{512} << 20;  ///< for what is known of tiles between insertions
   std::uint64_t batch_points = std::uint64_t{1} << 21;   ///< are coded together; more are held at no time
   const std::atomic<bool>* stop = nullptr;
@@ -36,7 +42,7 @@ struct UpdateReport {
   std::uint64_t points_added = 0;
   std::uint64_t points_known = 0;    ///< that stored ones stand for
   std::uint64_t dropped_points = 0;  ///< not finite
-  std::uint64_t tiles_touched = 0, tiles_new = 0, tiles_folded = 0, tiles_removed = 0;
+  std::uint64_t tiles_touched = 0, tiles_new = 0, tiles_folded = 0, tiles_removed = 0, tiles_split = 0;
   std::uint64_t bytes = 0;  ///< of new segments
 };
 
@@ -68,6 +74,11 @@ class MapUpdater {
   [[nodiscard]] Result<std::uint32_t> submap(const std::string& name, const std::optional<PoseChange>& pose);
   /// Errors: InvalidArgument, as MapWriter::set_poses. No tile is touched.
   [[nodiscard]] Status set_poses(std::span<const PoseChange> poses);
+
+  /// When the scans of a submap were taken [s since epoch]. Errors: InvalidArgument (no such submap).
+  [[nodiscard]] Status set_stamps(std::uint32_t submap, double first_s, double last_s);
+  /// MapInfo::extras of the next revision.
+  [[nodiscard]] Status set_extra(const std::string& name, Bytes value);
 
   /// @param points  [m, submap frame]; channels in any order. What the map does not keep is left out; what it
   /// keeps must be there. Points that are not finite are dropped and counted (lossless maps: kept).

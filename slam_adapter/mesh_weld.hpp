@@ -20,7 +20,7 @@ struct SurfaceMesh {
 /// Triangles of all patches. Corners of different patches within `gap_m` of each other (less on patches that
 /// are smaller than that) become one vertex at their mean; a vertex that near to another patch's edge is put
 /// into the edge: so cells of different size close on their common face, in one tile and across tiles. The
-/// sides of neighbouring patches do not always agree: draw both.
+/// sides of neighbouring patches do not always agree: see orient_faces.
 /// A vertex has the mean colour of its patches. Deterministic in the order of the patches. Threads: pure.
 [[nodiscard]] SurfaceMesh weld_patches(std::span<const SurfacePatch> patches, double gap_m);
 

@@ -137,6 +137,7 @@ class Chooser {
     choice_.plan = plan;
     choice_.rms_slope = s.rms_slope();
     choice_.bits_slope = s.bits_slope();
+    choice_.coded = s.coded();
   }
 
   /// In one line: what this promise costs, and what one at the sampling floor would.

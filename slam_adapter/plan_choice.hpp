@@ -3,6 +3,7 @@
 #pragma once
 
 #include <atomic>
+#include <optional>
 
 #include "slam_adapter/compress.hpp"
 #include "slam_adapter/tile_sample.hpp"
@@ -15,6 +16,8 @@ struct PlanChoice {
   double bits_slope = 1;  ///< - d log bits / d log step
   double spacing_m = 0;   ///< of the sample; 0 where it was not looked at
   double side_m = 0;      ///< longest side of a piece of the sample
+  /// The whole map's positions, coded by this plan, where the search came across them.
+  std::optional<CodedTiles> coded;
 };
 
 /// What the options ask of codecs: surfaces are for an RMS promise, and always keep counts.

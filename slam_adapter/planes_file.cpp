@@ -6,6 +6,7 @@
 #include <filesystem>
 
 #include "slam_adapter/formats/file_sink.hpp"
+#include "slam_adapter/mesh_orient.hpp"
 #include "slam_adapter/mesh_ply.hpp"
 
 namespace mapcodec {
@@ -144,7 +145,8 @@ Result<SurfaceReport> decompress_mesh(const std::string& map_path, const std::st
   MAPCODEC_ASSIGN(const MapFile map, MapFile::open(map_path, revision));
   MAPCODEC_ASSIGN(const Gathered g, gather(map, region, settings, report));
   report.tolerance_m = slit_width(map, g, options);
-  const SurfaceMesh mesh = weld_patches(g.patches, report.tolerance_m);
+  SurfaceMesh mesh = weld_patches(g.patches, report.tolerance_m);
+  orient_faces(mesh);
   MeshWriteOptions write;
   write.ascii = options.ascii;
   write.doubles = map.schema().coordinates.kind != CoordinateFormat::Kind::f32;

@@ -17,7 +17,9 @@ constexpr int kMostTries = 12;
 constexpr std::size_t kFewPoints = 60000;                         // for the first tries
 constexpr double kRmsAim = 0.992;                                 // of the promise
 constexpr double kCloseEnough = 0.06, kCloseEnoughOnAll = 0.015;  // of the target; the rest is extrapolated
-constexpr double kFinest = 1.0 / (1 << 20);                       // of the longest side of a piece
+constexpr int kTriesForNear = 3, kTriesForGood = 6;
+constexpr double kNearRms = 0.98, kLeastRms = 0.95;  // of the promise, where the sample is the whole map
+constexpr double kFinest = 1.0 / (1 << 20);          // of the longest side of a piece
 constexpr double kBitsPerStep =
     1.2;  // by how much the logarithm of the size falls with that of the step, usually
 
@@ -51,6 +53,21 @@ Result<double> color_floor_at(double step_m, std::size_t channel, const TileSamp
   });
 }
 
+/// The smallest coding that keeps the promise: sizes do not fall evenly with the step.
+struct Kept {
+  double step_m = 0, bits = INFINITY;
+  CodedSum sum;
+  CodedTiles coded;
+
+  void take_if_smaller(double step, const CodedSum& s, CodedTiles&& tiles) {
+    if (s.geometry_bits_per_point() >= bits) return;
+    step_m = step;
+    bits = s.geometry_bits_per_point();
+    sum = s;
+    coded = std::move(tiles);
+  }
+};
+
 }  // namespace
 
 Result<CodedSum> RateSearch::measure(const CodingPlan& plan) const {
@@ -62,9 +79,22 @@ Status RateSearch::seek_on(const TileSample& sample, CodingPlan& plan, const Map
   LogSecant secant(target, slope);
   // A small map is its own sample: being close there is being close.
   const double close = sample.whole ? kCloseEnoughOnAll : kCloseEnough;
+  const bool for_good = sample.whole && value == &CodedSum::rms_m;
+  CodedTiles coded;
+  Kept smallest;
+  coded_.reset();
   for (int i = 0; i < kMostTries; ++i) {
-    MAPCODEC_ASSIGN(found_, encode_sample(sample, schema, plan, arena_, stop_));
+    CodingPlan trial = plan;
+    trial.tiles.rough_errors = !for_good;
+    MapSchema with_step = schema;
+    with_step.step_m = plan.step_m;
+    MAPCODEC_ASSIGN(found_, encode_sample(sample, with_step, trial, arena_, stop_, &coded));
     const double got = (found_.*value)();
+    if (for_good && got <= target / kRmsAim) smallest.take_if_smaller(plan.step_m, found_, std::move(coded));
+    if (for_good && is_kept(i, got / target)) {
+      leapt_ = false;
+      break;
+    }
     const double next = std::clamp(secant.next(plan.step_m, got), steps.finest, steps.coarsest);
     slope = secant.slope();
     const double bits = found_.geometry_bits_per_point();
@@ -73,9 +103,23 @@ Status RateSearch::seek_on(const TileSample& sample, CodingPlan& plan, const Map
     plan.step_m = next;
     // The last stretch needs no try: the slope is known.
     leapt_ = secant.is_leap();
-    if (at_end || leapt_ || std::abs(got / target - 1) <= close) break;
+    // On the whole map itself being close is no end: what is found here is found for good.
+    const bool is_close = std::abs(got / target - 1) <= close && !for_good;
+    const bool is_late = i + 1 >= kTriesForGood && std::isfinite(smallest.bits);
+    if (at_end || leapt_ || is_close || is_late) break;
   }
+  if (!std::isfinite(smallest.bits)) return {};
+  plan.step_m = smallest.step_m;
+  found_ = smallest.sum;
+  expected_bits_ = smallest.bits;
+  coded_ = std::move(smallest.coded);
   return {};
+}
+
+/// At first only what comes near to the promise, later what is not far below.
+bool RateSearch::is_kept(int tries, double share_of_aim) const {
+  const double share = kRmsAim * share_of_aim;
+  return share <= 1 && share >= (tries < kTriesForNear ? kNearRms : kLeastRms);
 }
 
 /// Errors first on little, which gives the slope; sizes not, because small tiles take more bits.

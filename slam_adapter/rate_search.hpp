@@ -2,6 +2,8 @@
 // Finds the one step of a map that meets a promise or a size, on a sample of its tiles.
 #pragma once
 
+#include <optional>
+
 #include "slam_adapter/tile_sample.hpp"
 
 namespace mapcodec {
@@ -14,7 +16,8 @@ class RateSearch {
       : sample_(sample), schema_(schema), arena_(arena), stop_(stop) {}
 
   /// The step with which the sample's RMS is a little below `rms_m`, within about 1 %. Where even coarse
-  /// steps lose less (all points equal, say), a coarse one. Errors: those of encoding; Cancelled.
+  /// steps lose less (all points equal, say), a coarse one. Where the sample is the whole map, mostly one
+  /// that was tried and keeps the promise closely (see coded()). Errors: those of encoding; Cancelled.
   [[nodiscard]] Result<CodingPlan> for_rms(CodingPlan plan, double rms_m);
   /// The step with which the sample takes about `bits_per_point`, channels included. Errors: InvalidArgument
   /// where no step does, because channels alone take more; those of encoding; Cancelled.
@@ -22,6 +25,8 @@ class RateSearch {
   /// Positions alone.
   [[nodiscard]] Result<CodedSum> measure(const CodingPlan& plan) const;
 
+  /// The whole map's positions as coded at the found plan's step, if it was tried; its errors are exact.
+  [[nodiscard]] const std::optional<CodedTiles>& coded() const { return coded_; }
   /// What the last search measured last, at a step near that of its plan.
   [[nodiscard]] const CodedSum& found() const { return found_; }
   /// Whether its value leaps across the target, so that the plan is on one side of it.
@@ -46,8 +51,10 @@ class RateSearch {
                             double slope, const Range& steps);
   [[nodiscard]] Status seek_on(const TileSample& sample, CodingPlan& plan, const MapSchema& schema,
                                Value value, double target, const Range& steps, double& slope);
+  [[nodiscard]] bool is_kept(int tries, double share_of_aim) const;
 
   CodedSum found_;
+  std::optional<CodedTiles> coded_;
   bool leapt_ = false;
   double expected_bits_ = 0;
   double rms_slope_ = 1, bits_slope_ = 1;

@@ -24,6 +24,12 @@ void TileDirectory::add(const TileKey& key) {
   }
 }
 
+void TileDirectory::split(const TileKey& key) {
+  tiles_.erase(key);
+  above_.insert(key);
+  last_cell_.reset();
+}
+
 std::optional<TileKey> TileDirectory::find(const TileKey& cell) const {
   for (const std::uint8_t l : levels_) {
     const TileKey key = parent(cell, l);

@@ -20,6 +20,9 @@ class TileDirectory {
       : origin_(origin), tile_size_m_(tile_size_m), new_level_(new_level) {}
 
   void add(const TileKey& key);
+  /// Smaller tiles take the place of `key`: those of its parts that are added, and, as points come, the
+  /// others.
+  void split(const TileKey& key);
   /// The tile of `p`, added if it is new; unplaced for a point without a place; nothing where tile numbers
   /// leave 32 bits.
   [[nodiscard]] std::optional<TileKey> place(const Vec3& p);

@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "mapcodec/quality/nearest.hpp"
+#include "parallel/encode_pipeline.hpp"
 #include "parallel/runner.hpp"
 
 namespace mapcodec {
@@ -129,16 +130,26 @@ Result<TileSample> take_sample(const TileSet& tiles, Arena& arena) {
 }
 
 Result<CodedSum> encode_sample(const TileSample& sample, const MapSchema& schema, const CodingPlan& plan,
-                               Arena& arena, const std::atomic<bool>* stop) {
+                               Arena& arena, const std::atomic<bool>* stop, CodedTiles* tiles) {
   if (stop != nullptr && stop->load()) return make_error(ErrorCode::kCancelled, "interrupted");
   std::vector<std::optional<Result<EncodedTile>>> coded(sample.pieces.size());
+  std::vector<double> seconds(coded.size());
   TbbRunner(arena).run(coded.size(), [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) coded[i] = encode_by_plan(sample.pieces[i], schema, plan);
+    for (std::size_t i = begin; i < end; ++i) {
+      const double since = thread_seconds();
+      coded[i] = encode_by_plan(sample.pieces[i], schema, plan);
+      seconds[i] = thread_seconds() - since;
+    }
   });
   CodedSum sum;
   for (const auto& tile : coded) {
     if (!tile->ok()) return tile->error();
     sum.add(**tile);
+  }
+  if (tiles != nullptr) {
+    tiles->tiles.clear();
+    for (auto& tile : coded) tiles->tiles.push_back(std::move(**tile));
+    tiles->seconds = std::move(seconds);
   }
   return sum;
 }

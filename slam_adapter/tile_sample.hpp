@@ -25,10 +25,17 @@ struct TileSample {
 /// so that trying is cheap. The same for any number of threads. Errors: those of TileSet::load.
 [[nodiscard]] Result<TileSample> take_sample(const TileSet& tiles, Arena& arena);
 
+/// A sample as coded.
+struct CodedTiles {
+  std::vector<EncodedTile> tiles;
+  std::vector<double> seconds;  ///< processor time of each
+};
+
 /// Encodes the pieces in parallel. Errors: those of encoding; Cancelled.
+/// @param tiles  out: what became of each piece, if wanted.
 [[nodiscard]] Result<CodedSum> encode_sample(const TileSample& sample, const MapSchema& schema,
                                              const CodingPlan& plan, Arena& arena,
-                                             const std::atomic<bool>* stop);
+                                             const std::atomic<bool>* stop, CodedTiles* tiles = nullptr);
 
 /// Mean distance [m] of some thousand finite points, evenly spread, to the nearest other position.
 [[nodiscard]] double mean_spacing(std::vector<Vec3> points);

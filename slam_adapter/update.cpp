@@ -8,7 +8,9 @@
 #include "slam_adapter/create_map.hpp"
 #include "slam_adapter/formats/formats.hpp"
 #include "slam_adapter/map_file.hpp"
+#include "slam_adapter/octomap/octree_jobs.hpp"
 #include "slam_adapter/point_batch.hpp"
+#include "slam_adapter/scan_submaps.hpp"
 
 namespace mapcodec {
 namespace {
@@ -76,6 +78,7 @@ Status insert_file(MapUpdater& map, const std::string& path, const UpdateRequest
   ReadOptions read;
   read.keep_nonfinite = map.schema().promise == PromiseKind::lossless;
   read.unit_m = r.unit_m;
+  read.bag = r.bag;
   MAPCODEC_ASSIGN(const std::unique_ptr<PointSource> source, open_source(path, read));
   say_unkept(path, source->layout(), map.schema(), warnings);
   const RigidMotion pose =
@@ -94,6 +97,9 @@ Result<MapUpdater> open_or_create(const std::string& map_path, const UpdateReque
   ReadOptions read;
   read.keep_nonfinite = r.create->promise == PromiseKind::lossless;
   read.unit_m = r.unit_m;
+  read.bag = r.bag;
+  // Submaps hold scans as the sensor saw them.
+  if (r.each_scan) read.bag.poses = BagOptions::Poses::none;
   MAPCODEC_ASSIGN(const std::unique_ptr<PointSource> first, open_source(r.inputs.front(), read));
   auto map = create_map(map_path, *first, *r.create, arena, r.settings, warnings);
   if (!map.ok() && map.error().code != ErrorCode::kCannotWrite) return named(r.inputs.front(), map.error());
@@ -118,6 +124,7 @@ Status merge_tiles(MapUpdater& map, const MapFile& other, bool fuse, const std::
       std::max<std::size_t>(1, other.archive().info().submaps.size()));
   for (std::size_t i = 0; i < other.archive().tiles().size(); ++i) {
     const TileRecord& tile = other.archive().tiles()[i];
+    if (tile.submap == octree_submap(other.archive().info())) continue;
     const bool apart = !fuse && tile.submap < other.archive().info().submaps.size() &&
                        !other.archive().info().submaps[tile.submap].name.empty();
     if (!apart) {
@@ -140,15 +147,23 @@ Status merge_tiles(MapUpdater& map, const MapFile& other, bool fuse, const std::
 
 Result<UpdateReport> update_files(const std::string& map_path, const UpdateRequest& request, Arena& arena,
                                   std::vector<std::string>& warnings) {
+  if (request.each_scan && (request.pose || !request.submap.empty() || request.unit_m != 1))
+    return make_error(ErrorCode::kInvalidArgument, "scans of a bag bring their own poses, names and metres");
   if (request.pose) MAPCODEC_TRY(check_pose(request.pose->translation_m, request.pose->rotation_xyzw));
+  if (std::all_of(request.inputs.begin(), request.inputs.end(), is_octree_file))
+    return update_octrees(map_path, request, arena);
   MAPCODEC_ASSIGN(MapUpdater map, open_or_create(map_path, request, arena, warnings));
   MAPCODEC_TRY(check_promise(map.schema(), request));
   std::uint32_t submap = 0;
   if (!request.submap.empty()) {
     MAPCODEC_ASSIGN(submap, map.submap(request.submap, request.pose));
   }
-  for (const std::string& path : request.inputs)
-    MAPCODEC_TRY(insert_file(map, path, request, submap, warnings));
+  for (const std::string& path : request.inputs) {
+    if (request.each_scan)
+      MAPCODEC_TRY(insert_scans(map, path, request.bag, warnings));
+    else
+      MAPCODEC_TRY(insert_file(map, path, request, submap, warnings));
+  }
   for (const std::string& path : request.inputs) {
     MAPCODEC_ASSIGN(const std::uint64_t bytes, input_bytes(path));
     map.add_input_bytes(bytes);

@@ -20,6 +20,10 @@ struct UpdateRequest {
   double promise_m = 0;
   std::optional<double> color_error;
   double unit_m = 1;  ///< metres per unit of the inputs
+  BagOptions bag;     ///< of ROS bags among the inputs
+  /// Inputs are ROS bags: each of their clouds becomes a submap TOPIC@STAMP at its pose, so that a later
+  /// correction of poses moves it. Goes without `pose` and `submap`.
+  bool each_scan = false;
   std::int64_t timestamp_s = 0;
   UpdateSettings settings;
   /// Given: a map that is not there is begun, with these (promise, colour, channels, tile size) and a layout

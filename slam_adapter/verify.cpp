@@ -3,16 +3,18 @@
 
 #include "mapcodec/quality/multiset_hash.hpp"
 #include "slam_adapter/formats/formats.hpp"
+#include "slam_adapter/octomap/octree_jobs.hpp"
 
 namespace mapcodec {
 namespace {
 
 Result<std::unique_ptr<PointSource>> open_originals(const std::vector<std::string>& paths,
-                                                    bool keep_nonfinite) {
+                                                    const BagOptions& bag, bool keep_nonfinite) {
   std::vector<std::unique_ptr<PointSource>> sources;
   for (const std::string& path : paths) {
     ReadOptions options;
     options.keep_nonfinite = keep_nonfinite;
+    options.bag = bag;
     MAPCODEC_ASSIGN(std::unique_ptr<PointSource> source, open_source(path, options));
     sources.push_back(std::move(source));
   }
@@ -54,9 +56,9 @@ PointCloud without_order(PointCloud cloud) {
   return cloud;
 }
 
-Status check_lossless(const MapFile& map, const std::vector<std::string>& originals,
+Status check_lossless(const MapFile& map, const std::vector<std::string>& originals, const BagOptions& bag,
                       const ReadSettings& settings, VerifyOutcome& v) {
-  MAPCODEC_ASSIGN(const std::unique_ptr<PointSource> source, open_originals(originals, true));
+  MAPCODEC_ASSIGN(const std::unique_ptr<PointSource> source, open_originals(originals, bag, true));
   MAPCODEC_ASSIGN(const MultisetHash original, hash_of(*source, map.schema().layout()));
   MultisetHash decoded;
   MAPCODEC_TRY(map.read(Region{}, settings, [&](PointCloud&& cloud) {
@@ -92,9 +94,9 @@ void check_promise(const MapSchema& schema, VerifyOutcome& v) {
   }
 }
 
-Status check_lossy(const MapFile& map, const std::vector<std::string>& originals,
+Status check_lossy(const MapFile& map, const std::vector<std::string>& originals, const BagOptions& bag,
                    const ReadSettings& settings, VerifyOutcome& v) {
-  MAPCODEC_ASSIGN(const std::unique_ptr<PointSource> source, open_originals(originals, false));
+  MAPCODEC_ASSIGN(const std::unique_ptr<PointSource> source, open_originals(originals, bag, false));
   PointCloud original = source->layout(), block;
   for (;;) {
     MAPCODEC_ASSIGN(const bool more, source->next(block));
@@ -112,6 +114,15 @@ Status check_lossy(const MapFile& map, const std::vector<std::string>& originals
   return {};
 }
 
+/// An octree has no order and no loss: it is the same or not.
+Status check_octree(const MapFile& map, const std::vector<std::string>& originals,
+                    const ReadSettings& settings, VerifyOutcome& v) {
+  MAPCODEC_ASSIGN(const OctreeFile original, read_octrees(originals));
+  MAPCODEC_ASSIGN(const std::string difference, compare_occupancy_map(map.path(), original, settings));
+  require(v, difference.empty(), difference);
+  return {};
+}
+
 /// Every tile decodes, to as many points as the index says.
 Result<VerifyOutcome> check_tiles(const MapFile& map, const ReadSettings& settings) {
   VerifyOutcome v;
@@ -120,6 +131,15 @@ Result<VerifyOutcome> check_tiles(const MapFile& map, const ReadSettings& settin
     v.points += cloud.size();
     return Status{};
   }));
+  if (octree_submap(map.archive().info())) {
+    MAPCODEC_ASSIGN(const OccupancyMap octree, OccupancyMap::open(map.path()));
+    MAPCODEC_ASSIGN(const OccupancyTree tree, octree.read({}, settings));
+    std::uint64_t leaves = 0;
+    for (const std::size_t i : octree.tiles_in({})) leaves += map.archive().tiles()[i].points;
+    if (tree.leaf_count() != leaves)
+      return make_error(ErrorCode::kArchiveDamaged,
+                        "the octree has another number of leaves than the index says");
+  }
   if (v.points != map.summary().points) {
     return make_error(ErrorCode::kArchiveDamaged, "tiles decode to " + std::to_string(v.points) +
                                                       " points, the index says " +
@@ -142,11 +162,16 @@ Result<VerifyOutcome> verify_map(const std::string& path, const ReadSettings& se
 }
 
 Result<VerifyOutcome> verify_map_against(const std::string& path, const std::vector<std::string>& originals,
-                                         const ReadSettings& settings) {
+                                         const ReadSettings& settings, const BagOptions& bag) {
   MAPCODEC_ASSIGN(VerifyOutcome v, verify_map(path, settings));
   MAPCODEC_ASSIGN(const MapFile map, MapFile::open(path));
-  MAPCODEC_TRY(map.schema().promise == PromiseKind::lossless ? check_lossless(map, originals, settings, v)
-                                                             : check_lossy(map, originals, settings, v));
+  if (any_octree(originals)) {
+    MAPCODEC_TRY(check_octree(map, originals, settings, v));
+    return v;
+  }
+  MAPCODEC_TRY(map.schema().promise == PromiseKind::lossless
+                   ? check_lossless(map, originals, bag, settings, v)
+                   : check_lossy(map, originals, bag, settings, v));
   return v;
 }
 

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "mapcodec/quality/evaluation.hpp"
+#include "slam_adapter/formats/bag_options.hpp"
 #include "slam_adapter/map_file.hpp"
 
 namespace mapcodec {
@@ -22,9 +23,11 @@ struct VerifyOutcome {
 [[nodiscard]] Result<VerifyOutcome> verify_map(const std::string& path, const ReadSettings& settings);
 
 /// The same, and the promise measured against the original file.
+/// @param bag  of ROS bags among the originals.
 /// Errors: also those of reading the original.
 [[nodiscard]] Result<VerifyOutcome> verify_map_against(const std::string& path,
                                                        const std::vector<std::string>& originals,
-                                                       const ReadSettings& settings);
+                                                       const ReadSettings& settings,
+                                                       const BagOptions& bag = {});
 
 }  // namespace mapcodec

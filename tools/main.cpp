@@ -51,6 +51,7 @@ int main(int argc, char** argv) {
   add_pose(app, action);
   add_merge(app, action);
   add_flatten(app, action);
+  add_rawlog(app, action);
 #ifdef MAPCODEC_SERVICE
   add_sync(app, action);
 #endif

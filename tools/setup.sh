@@ -6,11 +6,13 @@ set -euo pipefail
 packages=(
   g++ cmake ninja-build ccache pkg-config                                   # to build
   libtbb-dev libzstd-dev libxxhash-dev libnanoflann-dev libeigen3-dev zlib1g-dev  # libraries
+  liboctomap-dev                                                            # octrees of OctoMap
   libcgal-dev libgmp-dev libmpfr-dev libpcl-dev                             # the 2014 paper's encoder, test oracles
   libgrpc++-dev libprotobuf-dev protobuf-compiler-grpc protobuf-compiler    # the map service
   libcli11-dev libspdlog-dev nlohmann-json3-dev libpng-dev                  # the programs
   libdraco-dev gnuplot-nox zstd xz-utils                                    # what the benchmarks compare with and draw
-  libgtest-dev python3 python3-grpcio grpc-proto                            # tests
+  liblz4-dev libbz2-dev libpugixml-dev libyaml-cpp-dev                      # ROS bags, E57, Autoware's metadata
+  libgtest-dev python3 librosbag-storage-dev python3-grpcio grpc-proto      # tests
 )
 [[ "${1:-}" == fuzz ]] && packages+=(clang-14 libclang-rt-14-dev)
 

@@ -96,6 +96,7 @@ Bytes write_schema(const MapSchema& s) {
   }
   out.varint(s.channels.size());
   for (const ChannelSchema& c : s.channels) write_channel(out, c);
+  if (s.occupancy) out.u8(static_cast<std::uint8_t>(*s.occupancy));
   return out.take();
 }
 
@@ -121,7 +122,10 @@ Result<MapSchema> read_schema(ByteSpan bytes, const DecodeLimits& limits) {
     MAPCODEC_ASSIGN(ChannelSchema c, read_channel(in));
     s.channels.push_back(std::move(c));
   }
+  if (in.left() > 0) s.occupancy = static_cast<OccupancyKind>(in.u8());
   MAPCODEC_TRY(in.status("map schema"));
+  if (s.occupancy && (*s.occupancy < OccupancyKind::binary || *s.occupancy > OccupancyKind::color))
+    return malformed("unknown kind of occupancy", in);
   return s;
 }
 

@@ -3,12 +3,14 @@
 // decoder.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "mapcodec/base/byte_reader.hpp"
 #include "mapcodec/base/decode_limits.hpp"
 #include "mapcodec/base/result.hpp"
 #include "mapcodec/cloud/channel.hpp"
+#include "mapcodec/cloud/occupancy_tree.hpp"
 #include "mapcodec/cloud/point_cloud.hpp"
 
 namespace mapcodec {
@@ -48,6 +50,8 @@ struct MapSchema {
   double step_m = 0;         ///< voxel side of `points` tiles; 0 where there is none
   CoordinateFormat coordinates;
   std::vector<ChannelSchema> channels;  ///< in the order of the source, dropped ones too
+  /// A map of occupancy tiles: what their leaves hold. A level-0 tile is then a voxel (`occupancy_schema`).
+  std::optional<OccupancyKind> occupancy;
 
   /// Layout of a decoded cloud: all channels but the dropped ones.
   [[nodiscard]] PointCloud layout() const;

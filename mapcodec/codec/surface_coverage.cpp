@@ -32,6 +32,14 @@ constexpr std::array<std::uint64_t, 3> kLowFace{0x1111111111111111u, 0x000f000f0
 constexpr std::array<std::uint64_t, 3> kHighFace{0x8888888888888888u, 0xf000f000f000f000u,
                                                  0xffff000000000000u};
 
+/// The cells of a block at `from` and from + 1 along an axis, where from is in [-1, 3].
+std::uint64_t two_of(unsigned axis, std::int64_t from) {
+  const unsigned step = 2 * axis;
+  if (from < 0) return kLowFace[axis];
+  if (from > 2) return kHighFace[axis];
+  return (kLowFace[axis] | kLowFace[axis] << (1u << step)) << (static_cast<unsigned>(from) << step);
+}
+
 /// What the cells of one block touch along one axis, in the block at `to` = -1, 0 or 1 along it.
 std::uint64_t touched(std::uint64_t cells, unsigned axis, int to) {
   const unsigned step = 2 * axis, one = 1u << step, across = 3u << step;
@@ -144,15 +152,22 @@ double Coverage::nearest_of_eight(Level& level, const Cell& p) {
   Cell low;
   for (std::size_t d = 0; d < 3; ++d) low[d] = (p[d] - half) >> level.side;
   double best = kFar;
-  for (int i = 0; i < 8; ++i) {
-    const std::int64_t x = low[0] + (i & 1), y = low[1] + ((i >> 1) & 1), z = low[2] + (i >> 2);
-    if (x < 0 || y < 0 || z < 0) continue;
-    const Block& block = level.block_at(key_of(x >> 2, y >> 2, z >> 2));
-    if (((block.cells >> bit_of(x, y, z)) & 1) == 0) continue;
-    const auto dx = static_cast<double>((x << level.side) + half - p[0]);
-    const auto dy = static_cast<double>((y << level.side) + half - p[1]);
-    const auto dz = static_cast<double>((z << level.side) + half - p[2]);
-    best = std::min(best, dx * dx + dy * dy + dz * dz);
+  // Mostly they are all in one block.
+  for (std::int64_t z = low[2] >> 2; z <= (low[2] + 1) >> 2; ++z) {
+    for (std::int64_t y = low[1] >> 2; y <= (low[1] + 1) >> 2; ++y) {
+      for (std::int64_t x = low[0] >> 2; x <= (low[0] + 1) >> 2; ++x) {
+        if (x < 0 || y < 0 || z < 0) continue;
+        std::uint64_t cells = level.block_at(key_of(x, y, z)).cells & two_of(0, low[0] - 4 * x) &
+                              two_of(1, low[1] - 4 * y) & two_of(2, low[2] - 4 * z);
+        for (; cells != 0; cells &= cells - 1) {
+          const std::int64_t bit = std::countr_zero(cells);
+          const auto dx = static_cast<double>(((4 * x + (bit & 3)) << level.side) + half - p[0]);
+          const auto dy = static_cast<double>(((4 * y + ((bit >> 2) & 3)) << level.side) + half - p[1]);
+          const auto dz = static_cast<double>(((4 * z + (bit >> 4)) << level.side) + half - p[2]);
+          best = std::min(best, dx * dx + dy * dy + dz * dz);
+        }
+      }
+    }
   }
   return best;
 }
@@ -161,7 +176,7 @@ double Coverage::squared_distance(const std::array<double, 3>& place, double cov
   Cell p;
   for (std::size_t d = 0; d < 3; ++d) p[d] = static_cast<std::int64_t>(std::max(0.0, place[d]));
   if (is_near(level(first), p)) return 0;
-  for (std::size_t l = first; l < levels_.size(); ++l) {
+  for (std::size_t l = first + 1; l < levels_.size(); ++l) {
     if (!is_near(level(l), p)) continue;
     const double squared = nearest_of_eight(levels_[l], p);
     if (squared < kFar) return squared < covered ? 0 : squared;
@@ -169,10 +184,13 @@ double Coverage::squared_distance(const std::array<double, 3>& place, double cov
   return kFar;
 }
 
-double Coverage::sum_of_squared(std::span<const std::array<double, 3>> places, double covered) {
+double Coverage::sum_of_squared(std::span<const std::array<double, 3>> places, double covered, double most) {
   const std::size_t first = first_level(covered);
   double sum = 0;
-  for (const auto& p : places) sum += squared_distance(p, covered, first);
+  for (const auto& p : places) {
+    sum += squared_distance(p, covered, first);
+    if (sum > most) break;
+  }
   return sum;
 }
 

@@ -22,8 +22,9 @@ class Coverage {
   [[nodiscard]] double squared_distance(const std::array<double, 3>& place, double covered) {
     return squared_distance(place, covered, first_level(covered));
   }
-  /// Sum over several places.
-  [[nodiscard]] double sum_of_squared(std::span<const std::array<double, 3>> places, double covered);
+  /// Sum over several places, or over some of them that is more than `most`.
+  [[nodiscard]] double sum_of_squared(std::span<const std::array<double, 3>> places, double covered,
+                                      double most);
 
  private:
   static constexpr std::uint64_t kFree = ~std::uint64_t{0};

@@ -181,13 +181,13 @@ LeafError LeafErrors::of_few(const TreeCell& cell, const Plane& plane, std::uint
   std::array<float, kFew> near;
   near.fill(kFarPlace * kFarPlace);
   double forth = 0;
-  const std::size_t n = cell.count() <= kFew / 2 ? kFew / 2 : kFew;
   for (std::size_t j = cell.begin; j < cell.end; ++j) {
     const float x = static_cast<float>(points_[j][0] - static_cast<std::int32_t>(cell.at[0])),
                 y = static_cast<float>(points_[j][1] - static_cast<std::int32_t>(cell.at[1])),
                 z = static_cast<float>(points_[j][2] - static_cast<std::int32_t>(cell.at[2]));
-    forth += static_cast<double>(n == kFew ? nearest_of<kFew>(few.at, x, y, z, near)
-                                           : nearest_of<kFew / 2>(few.at, x, y, z, near));
+    forth += static_cast<double>(cell.count() > kFew / 2   ? nearest_of<kFew>(few.at, x, y, z, near)
+                                 : cell.count() > kFew / 4 ? nearest_of<kFew / 2>(few.at, x, y, z, near)
+                                                           : nearest_of<kFew / 4>(few.at, x, y, z, near));
   }
   double back = 0;
   for (std::uint32_t i = 0; i < cell.count(); ++i) back += static_cast<double>(near[i]);
@@ -209,12 +209,13 @@ LeafError LeafErrors::of_many(const TreeCell& cell, const Plane& plane, const Po
 }
 
 double LeafErrors::missed(const TreeCell& cell, const Plane& plane, const Polygon& polygon,
-                          std::uint32_t probes) {
+                          std::uint32_t probes, double most) {
   const std::uint32_t n = cell.count();
   const double covered = area_of(cell.shape, plane, polygon) / n + kStep2 * kCoveredSteps2;
   places_.clear();
   scatter(cell, plane, polygon, probes, places_);
-  return coverage_.sum_of_squared(places_, covered) * n / double(places_.size());
+  const double share = n / double(places_.size());
+  return coverage_.sum_of_squared(places_, covered, most / share) * share;
 }
 
 double LeafErrors::roughness(const TreeCell& cell, const Plane& plane, double mean_squared) const {

@@ -43,9 +43,9 @@ class LeafErrors {
                                   double beside, double missed, std::uint8_t noise, double roughness,
                                   double lambda) const;
   /// Squared distances from the polygon to the nearest originals where there are none near, over all the
-  /// points that the leaf would give.
+  /// points that the leaf would give. @param most  a larger sum may be cut short above it.
   [[nodiscard]] double missed(const TreeCell& cell, const Plane& plane, const Polygon& polygon,
-                              std::uint32_t probes);
+                              std::uint32_t probes, double most = kNever);
   /// 1 where heights of points side by side have nothing in common, 0 where they are the same.
   [[nodiscard]] double roughness(const TreeCell& cell, const Plane& plane, double mean_squared) const;
   /// The line that cuts most off the polygon without cutting off points; false if none cuts much.

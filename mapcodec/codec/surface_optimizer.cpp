@@ -238,7 +238,7 @@ class Optimizer {
     const Shape shape{cell, plane, polygon, beside, rough};
     double missed = 0;
     if (probe(shape, std::min(limit, cost_of(best)), r, missed)) take_if_better(r, best);
-    if (missed < lambda_ * 4 || least + lambda_ * (r.bits + 8) >= std::min(limit, cost_of(best))) return;
+    if (missed < lambda_ * kWedgeBits || least + lambda_ * (r.bits + 8) >= std::min(limit, cost_of(best))) return;
     consider_wedge(shape, c, flags, r, limit, best);
   }
 
@@ -269,19 +269,25 @@ class Optimizer {
     return errors_.of_many(s.cell, s.plane, s.polygon, s.beside, missed, noise, s.roughness, lambda_);
   }
 
-  /// Fills in the errors of a candidate: from a few probes first, and from many if it could win.
+  /// Fills in the errors of a candidate: from a few probes first, and from many if it could win. `missed` is
+  /// not exact where it is too much anyway.
   bool probe(const Shape& s, double to_beat, Candidate& r, double& missed) {
     const std::uint32_t n = s.cell.count();
+    set_error(r, error_of(s, 0, r.noise));
+    const double most = std::max((to_beat - cost_of(r)) / (1 - forward_), kWedgeBits * lambda_) * kAboveRounding;
     if (n > LeafErrors::kFewProbes) {
-      missed = errors_.missed(s.cell, s.plane, s.polygon, LeafErrors::kFewProbes);
-      set_error(r, error_of(s, 0.4 * missed, r.noise));
+      missed = errors_.missed(s.cell, s.plane, s.polygon, LeafErrors::kFewProbes, most / kShareOfFew);
+      set_error(r, error_of(s, kShareOfFew * missed, r.noise));
       if (cost_of(r) >= to_beat) return false;
     }
-    missed = errors_.missed(s.cell, s.plane, s.polygon, std::min(n, LeafErrors::kManyProbes));
+    missed = errors_.missed(s.cell, s.plane, s.polygon, std::min(n, LeafErrors::kManyProbes), most);
     set_error(r, error_of(s, missed, r.noise));
     return true;
   }
 
+  static constexpr double kShareOfFew = 0.4;  // of what few probes miss: they may be wrong by so much
+  static constexpr double kWedgeBits = 4;     // a wedge can save no less than it costs
+  static constexpr double kAboveRounding = 1.0001;
   static constexpr double kLeastThickness2 = 16;  // [units^2]: thinner leaves are planes
 
   double roughness_of(const TreeCell& cell, const Plane& plane, double beside) const {

@@ -32,15 +32,18 @@ double largest_axis_distance(std::span<const Vec3> from, std::span<const Vec3> t
   return most;
 }
 
+void set_rms(double forward_m, double backward_m, SurfaceTile& r) {
+  r.rms_forward_m = forward_m;
+  r.rms_backward_m = backward_m;
+  r.errors.rms_m = std::max(forward_m, backward_m);
+}
+
 void measure(const std::vector<Vec3>& original, const std::vector<Vec3>& decoded, const NearestPair& near,
              SurfaceTile& r) {
-  r.rms_forward_m = root_mean(near.forth);
-  r.rms_backward_m = root_mean(near.back);
-  r.errors.rms_m = std::max(r.rms_forward_m, r.rms_backward_m);
+  set_rms(root_mean(near.forth), root_mean(near.back), r);
   r.errors.max_axis_error_m = std::max(largest_axis_distance(original, decoded, near.forth),
                                        largest_axis_distance(decoded, original, near.back));
   r.errors.density_error = density_error(original, decoded);
-  for (const Vec3& p : decoded) r.bounds.add(p);
 }
 
 bool is_bounded_color(const ChannelSchema& c) {
@@ -117,13 +120,19 @@ class TileChannels {
 }  // namespace
 
 Result<SurfaceTile> encode_surface_tile(const PointCloud& tile, const MapSchema& schema, double step_m,
-                                        Effort effort, double color_loss) {
+                                        const TileSettings& settings) {
   const Quantizer lattice{schema.origin, step_m, schema.coordinates.kind};
-  MAPCODEC_ASSIGN(SurfaceEncoding e, encode_surface(tile.xyz, lattice, {effort}));
-  const NearestPair near = find_nearest_pair(tile.xyz, e.decoded);
+  MAPCODEC_ASSIGN(SurfaceEncoding e, encode_surface(tile.xyz, lattice, {settings.effort}));
   SurfaceTile r;
-  measure(tile.xyz, e.decoded, near, r);
-  MAPCODEC_TRY(TileChannels(tile, schema, near, effort, color_loss).encode(e, r));
+  for (const Vec3& p : e.decoded) r.bounds.add(p);
+  if (settings.rough_errors && coded_channels(schema, CodecId::surface).empty()) {
+    const RoughErrors rough = estimate_errors(tile.xyz, e.decoded);
+    set_rms(std::sqrt(rough.forth), std::sqrt(rough.back), r);
+  } else {
+    const NearestPair near = find_nearest_pair(tile.xyz, e.decoded);
+    measure(tile.xyz, e.decoded, near, r);
+    MAPCODEC_TRY(TileChannels(tile, schema, near, settings.effort, settings.color_loss).encode(e, r));
+  }
   r.geometry = std::move(e.bytes);
   return r;
 }

@@ -19,9 +19,9 @@ struct SurfaceTile {
 };
 
 /// @param tile  at least one point; channels as in schema.channels.
-/// @param step_m  surface step.
+/// @param step_m  surface step. @param settings  effort, color_loss, rough_errors.
 /// Errors: InvalidArgument (as encode_surface and encode_channel).
 [[nodiscard]] Result<SurfaceTile> encode_surface_tile(const PointCloud& tile, const MapSchema& schema,
-                                                      double step_m, Effort effort, double color_loss = 0);
+                                                      double step_m, const TileSettings& settings);
 
 }  // namespace mapcodec

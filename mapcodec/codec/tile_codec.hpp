@@ -60,6 +60,9 @@ struct TileSettings {
   /// surface: > 0: bounded colour is not coded to its bound but with this loss on top of the least error that
   /// the tile's positions allow (see encode_surface_color). The map's bound is then the caller's to keep.
   double color_loss = 0;
+  /// points, surface: for searches. Where no channel is coded, the RMS is measured on a part of the points
+  /// (within about 1 %), and neither the largest nor the density error is.
+  bool rough_errors = false;
   PaperSettings paper;
 };
 

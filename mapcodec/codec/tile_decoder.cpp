@@ -3,6 +3,7 @@
 // (FORMAT.md 3).
 #include "mapcodec/attribute/channel_decoder.hpp"
 #include "mapcodec/codec/lossless_decoder.hpp"
+#include "mapcodec/codec/occupancy_decoder.hpp"
 #include "mapcodec/codec/paper_decoder.hpp"
 #include "mapcodec/codec/points_decoder.hpp"
 #include "mapcodec/codec/surface_decoder.hpp"
@@ -69,6 +70,10 @@ Result<PointCloud> decode_tile(ByteSpan bytes, const MapSchema& schema, const De
   }
   MAPCODEC_ASSIGN(const TileSections s, read_tile_sections(bytes, schema, limits));
   if (s.header.codec == CodecId::paper) return decode_paper(s.geometry, s.header.points, schema, limits);
+  if (s.header.codec == CodecId::occupancy) {
+    MAPCODEC_ASSIGN(const OccupancyPiece piece, decode_occupancy(s.geometry, s.header.points, limits));
+    return occupancy_points(piece, schema, limits);
+  }
   return decode_with_channels(s, schema, limits);
 }
 

@@ -48,7 +48,10 @@ Result<Geometry> encode_points_geometry(const PointCloud& tile, const MapSchema&
   // nearest original than from its own: so the larger direction is this one, and no search is needed.
   g.errors.rms_m = std::sqrt(e.sum_squared_error / static_cast<double>(tile.size()));
   g.errors.max_axis_error_m = e.max_axis_error_m;
-  g.errors.density_error = density_error(tile.xyz, g.decoded);
+  if (settings.rough_errors) return g;
+  const bool all_kept = g.order.size() == tile.size();
+  g.errors.density_error =
+      all_kept ? density_error_of_moved(tile.xyz, g.decoded, g.order) : density_error(tile.xyz, g.decoded);
   return g;
 }
 
@@ -128,8 +131,7 @@ Result<EncodedTile> encode_with_channels(const PointCloud& tile, const MapSchema
 Result<EncodedTile> encode_by_surfaces(const PointCloud& tile, const MapSchema& schema,
                                        const TileSettings& settings) {
   const double step_m = step_of(schema, settings);
-  MAPCODEC_ASSIGN(const SurfaceTile t,
-                  encode_surface_tile(tile, schema, step_m, settings.effort, settings.color_loss));
+  MAPCODEC_ASSIGN(const SurfaceTile t, encode_surface_tile(tile, schema, step_m, settings));
   ByteWriter out;
   EncodedTile r = begin_tile(tile, schema, CodecId::surface, tile.size(), step_m, out);
   append_section(out, t.geometry, t.channels.empty());

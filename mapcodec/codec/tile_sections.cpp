@@ -14,7 +14,7 @@ Result<TileHeader> read_header(ByteReader& in, std::uint8_t& flags) {
   flags = in.u8();
   h.points = in.varint();
   MAPCODEC_TRY(in.status("tile header"));
-  if (h.codec < CodecId::lossless || h.codec > CodecId::surface) {
+  if (h.codec < CodecId::lossless || h.codec > CodecId::occupancy) {
     return make_error(ErrorCode::kUnknownCodec,
                       "tile codec " + std::to_string(int(h.codec)) + " is not known here", 0);
   }

@@ -12,10 +12,10 @@ inline constexpr std::uint8_t kTileFlagOwnStep =
 inline constexpr std::uint8_t kTileFlagPending = 2;
 
 /// Indices of the channels of `schema` that have a section of their own in a tile of this codec: those kept
-/// exactly or within a bound. A `paper` tile carries its colour inside the geometry section.
+/// exactly or within a bound. A `paper` or `occupancy` tile carries all inside the geometry section.
 [[nodiscard]] inline std::vector<std::size_t> coded_channels(const MapSchema& schema, CodecId codec) {
   std::vector<std::size_t> r;
-  if (codec == CodecId::paper) return r;
+  if (codec == CodecId::paper || codec == CodecId::occupancy) return r;
   for (std::size_t i = 0; i < schema.channels.size(); ++i) {
     const ChannelKept kept = schema.channels[i].kept;
     if (kept == ChannelKept::exact || kept == ChannelKept::bounded) r.push_back(i);

@@ -125,6 +125,44 @@ void add_all(std::span<const Vec3> points, const Grid& grid, std::int64_t change
   }
 }
 
+/// Cells of four grids, each a quarter of a voxel farther, from one look: their faces all lie on the grid of
+/// quarters.
+class QuarterGrid {
+ public:
+  explicit QuarterGrid(double side) : inverse_(4 / side) {}
+
+  /// Quarters of `p` on each axis; false close to a face or far away, where only a division tells the side.
+  [[nodiscard]] bool quarters(const Vec3& p, Cell& q) const {
+    bool sure = true;
+    for (std::size_t d = 0; d < 3; ++d) {
+      const double guess = p[d] * inverse_;
+      const bool near = std::abs(guess) < 1e8;
+      q[d] = near ? static_cast<std::int64_t>(guess + 0x1p30) - (std::int64_t{1} << 30) : 0;
+      const double fraction = guess - static_cast<double>(q[d]);
+      sure = sure && near && fraction > 1e-6 && fraction < 1 - 1e-6;
+    }
+    return sure;
+  }
+  [[nodiscard]] static Cell cell(const Cell& q, int shift) {
+    return {(q[0] + shift) >> 2, (q[1] + shift) >> 2, (q[2] + shift) >> 2};
+  }
+
+ private:
+  double inverse_;
+};
+
+/// One of the shifted grids and what has moved between its cells.
+struct Shifted {
+  Grid grid;
+  Differences differences;
+
+  void move(const Cell& from, const Cell& to) {
+    if (from == to) return;
+    differences.add(from, -1);
+    differences.add(to, 1);
+  }
+};
+
 }  // namespace
 
 double density_difference(std::span<const Vec3> original, std::span<const Vec3> decoded, double voxel_m,
@@ -134,6 +172,34 @@ double density_difference(std::span<const Vec3> original, std::span<const Vec3> 
   add_all(original, grid, -1, differences);
   add_all(decoded, grid, 1, differences);
   return differences.sum_of_magnitudes();
+}
+
+double density_error_of_moved(std::span<const Vec3> original, std::span<const Vec3> decoded,
+                              std::span<const std::uint32_t> order, double voxel_m) {
+  const auto n = static_cast<double>(count_finite(original));
+  if (n == 0) return std::numeric_limits<double>::quiet_NaN();
+  constexpr int kShifts = 4;
+  const QuarterGrid quarters(voxel_m);
+  std::vector<Shifted> grids;
+  for (int s = 0; s < kShifts; ++s) {
+    const Grid grid(voxel_m, voxel_m * s / kShifts);
+    grids.push_back({grid, Differences(grid.cell(first_finite(original)))});
+  }
+  for (std::size_t i = 0; i < decoded.size(); ++i) {
+    const Vec3 &from = original[order[i]], &to = decoded[i];
+    if (!is_finite(from) || !is_finite(to)) continue;
+    Cell a{}, b{};
+    const bool sure_a = quarters.quarters(from, a), sure_b = quarters.quarters(to, b);
+    if (sure_a && sure_b) {
+      for (int s = 0; s < kShifts && a != b; ++s)
+        grids[std::size_t(s)].move(QuarterGrid::cell(a, s), QuarterGrid::cell(b, s));
+    } else {
+      for (Shifted& g : grids) g.move(g.grid.cell(from), g.grid.cell(to));
+    }
+  }
+  double sum = 0;
+  for (const Shifted& g : grids) sum += g.differences.sum_of_magnitudes() / n / kShifts;
+  return sum;
 }
 
 double density_error(std::span<const Vec3> original, std::span<const Vec3> decoded, double voxel_m,

@@ -2,6 +2,7 @@
 // How far the number of points per voxel has changed.
 #pragma once
 
+#include <cstdint>
 #include <span>
 
 #include "mapcodec/cloud/vec3.hpp"
@@ -18,6 +19,12 @@ namespace mapcodec {
 /// Threads: pure.
 [[nodiscard]] double density_error(std::span<const Vec3> original, std::span<const Vec3> decoded,
                                    double voxel_m = 0.1, int shifts = 4);
+
+/// The same over four grids, several times faster, where it is known which point became which: most stay in
+/// their voxels.
+/// @param order  decoded point i comes from original order[i]; a permutation, so that no point is lost.
+[[nodiscard]] double density_error_of_moved(std::span<const Vec3> original, std::span<const Vec3> decoded,
+                                            std::span<const std::uint32_t> order, double voxel_m = 0.1);
 
 /// One of the grids above: sum |n_decoded - n_original| over voxels whose grid is moved by `offset_m` on all
 /// axes.

@@ -350,6 +350,26 @@ Nearest GridNearest::find(std::span<const Vec3> from, std::span<const std::uint3
   return r;
 }
 
+double GridNearest::mean_squared(std::span<const Vec3> from, std::span<const std::uint32_t> order,
+                                 std::size_t every) const {
+  double sum = 0, count = 0;
+  std::uint32_t hint = 0;
+  for (std::size_t k = every / 2; k < order.size(); k += every, ++count) {
+    const Best best = impl_->search(from[order[k]], hint);
+    sum += best.squared;
+    hint = best.at;
+  }
+  return count > 0 ? sum / count : 0;
+}
+
+RoughErrors estimate_errors(std::span<const Vec3> a, std::span<const Vec3> b) {
+  // An eighth of many points is enough, all of few are soon asked.
+  const auto every = [](std::size_t n) { return std::clamp<std::size_t>(n / 8000, 1, 8); };
+  const GridNearest in_a(a), in_b(b);
+  return {in_b.mean_squared(a, in_a.order(), every(a.size())),
+          in_a.mean_squared(b, in_b.order(), every(b.size()))};
+}
+
 NearestPair find_nearest_pair(std::span<const Vec3> a, std::span<const Vec3> b) {
   const GridNearest in_a(a), in_b(b);
   return {in_b.find(a, in_a.order()), in_a.find(b, in_b.order())};

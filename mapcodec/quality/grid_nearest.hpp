@@ -27,6 +27,9 @@ class GridNearest {
   /// For each of `from` its nearest point here, as find_nearest gives (of equally near ones always the same).
   /// @param order  in which to ask: all of `from`.
   [[nodiscard]] Nearest find(std::span<const Vec3> from, std::span<const std::uint32_t> order) const;
+  /// Mean squared distance [m^2] of every `every`-th of `from` in that order.
+  [[nodiscard]] double mean_squared(std::span<const Vec3> from, std::span<const std::uint32_t> order,
+                                    std::size_t every) const;
 
  private:
   struct Impl;
@@ -40,5 +43,13 @@ struct NearestPair {
 };
 /// @param a, b  as for GridNearest.
 [[nodiscard]] NearestPair find_nearest_pair(std::span<const Vec3> a, std::span<const Vec3> b);
+
+/// Mean squared distances [m^2] both ways, from a part of the points: within about 1 % of the exact ones'
+/// root for 10,000 points.
+struct RoughErrors {
+  double forth, back;
+};
+/// @param a, b  as for GridNearest.
+[[nodiscard]] RoughErrors estimate_errors(std::span<const Vec3> a, std::span<const Vec3> b);
 
 }  // namespace mapcodec

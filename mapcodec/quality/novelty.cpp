@@ -20,10 +20,18 @@ std::uint64_t mix(std::uint64_t h) {
   return h ^ (h >> 32);
 }
 
-/// From 64-bit keys to values, by open addressing: one cache miss a look. Key 0 is kept apart.
+/// From 64-bit keys to values, by open addressing: one cache miss a look.
 template <class Value>
 class KeyTable {
  public:
+  /// For `more` new keys at once.
+  void reserve(std::size_t more) {
+    while (2 * (count_ + more + 1) > slots_.size()) grow();
+  }
+  /// Begins to bring what find or at will look at.
+  void prefetch(std::uint64_t key) const {
+    if (!slots_.empty()) __builtin_prefetch(&slots_[mix(key) & mask_]);
+  }
   [[nodiscard]] const Value* find(std::uint64_t key) const {
     if (slots_.empty()) return nullptr;
     for (std::size_t at = mix(key) & mask_;; at = (at + 1) & mask_) {
@@ -160,56 +168,90 @@ class NearStored final : public StoredPoints {
     return best;
   }
 
-  /// Points of one cell, of those that something stored may stand for.
-  struct CellPoints {
+  static constexpr int kPiece = 2;          // log2 of a piece's side in cells
+  static constexpr double kCheaper = 0.25;  // a point beyond these few costs little in its piece
+
+  /// Points of one cell or piece, of those that something stored may stand for.
+  struct Group {
     double sum = 0;
     std::vector<std::uint32_t> points;
   };
+  struct Choice {
+    std::vector<std::uint32_t> added;
+    double sum = 0;  ///< squares of the others
+    double cost = 0;
+  };
 
-  /// Whole cells are taken, the worst first: pieces of surface take fewer bits than as many scattered points.
+  [[nodiscard]] static bool is_reached(float square) { return square <= float(kReach * kReach); }
+  /// What n points of one piece take to code, about.
+  [[nodiscard]] static double cost_of(double n) { return n / (1 + kCheaper * n); }
+  [[nodiscard]] std::uint64_t group_of(const Vec3& p, int shift) const {
+    const Local l = local(p);
+    return pack(l.cell[0] >> shift, l.cell[1] >> shift, l.cell[2] >> shift);
+  }
+
+  /// Groups are taken whole, the worst first: where surfaces are coded, a whole piece takes hardly more than
+  /// a few of its points. Where all pieces are equally bad, cells are the better groups.
   [[nodiscard]] Novelty choose(const PointCloud& cloud, const std::vector<float>& squares,
                                double allowed) const {
+    Choice best = take(cloud, squares, allowed, kPiece);
+    Choice fine = take(cloud, squares, allowed, 0);
+    if (fine.cost < best.cost) best = std::move(fine);
     Novelty r;
-    double sum = 0;
-    std::size_t known = 0;
-    for (std::uint32_t i = 0; i < squares.size(); ++i) {
-      const bool reached = squares[i] <= static_cast<float>(kReach * kReach);
-      if (!reached) r.added.push_back(i);
-      sum += reached ? squares[i] : 0;
-      known += reached;
-    }
-    if (sum > allowed * static_cast<double>(known)) {
-      for (const CellPoints& cell : worst_first(cloud, squares)) {
-        if (sum <= allowed * static_cast<double>(known)) break;
-        sum -= cell.sum;
-        known -= cell.points.size();
-        r.added.insert(r.added.end(), cell.points.begin(), cell.points.end());
-      }
-      std::sort(r.added.begin(), r.added.end());
-    }
-    r.squared_m2 = known == 0 ? 0 : std::max(0.0, sum) * rms_m_ * rms_m_;
+    r.squared_m2 = std::max(0.0, best.sum) * rms_m_ * rms_m_;
+    r.added = std::move(best.added);
     return r;
   }
 
-  [[nodiscard]] std::vector<CellPoints> worst_first(const PointCloud& cloud,
-                                                    const std::vector<float>& squares) const {
-    KeyTable<std::uint32_t> numbers;  // 1 + index of the cell
-    std::vector<CellPoints> cells;
+  [[nodiscard]] Choice take(const PointCloud& cloud, const std::vector<float>& squares, double allowed,
+                            int shift) const {
+    Choice r;
+    std::size_t known = 0;
     for (std::uint32_t i = 0; i < squares.size(); ++i) {
-      if (squares[i] > static_cast<float>(kReach * kReach)) continue;
-      const Local l = local(cloud.xyz[i]);
-      std::uint32_t& number = numbers.at(pack(l.cell[0], l.cell[1], l.cell[2]));
-      if (number == 0) {
-        cells.emplace_back();
-        number = static_cast<std::uint32_t>(cells.size());
-      }
-      cells[number - 1].sum += squares[i];
-      cells[number - 1].points.push_back(i);
+      if (!is_reached(squares[i])) r.added.push_back(i);
+      r.sum += is_reached(squares[i]) ? squares[i] : 0;
+      known += is_reached(squares[i]);
     }
-    const auto mean = [](const CellPoints& c) { return c.sum / static_cast<double>(c.points.size()); };
-    std::stable_sort(cells.begin(), cells.end(),
-                     [&](const CellPoints& a, const CellPoints& b) { return mean(a) > mean(b); });
-    return cells;
+    if (r.sum <= allowed * static_cast<double>(known)) return r;
+    for (const Group& group : worst_first(cloud, squares, allowed, shift)) {
+      if (r.sum <= allowed * static_cast<double>(known)) break;
+      r.sum -= group.sum;
+      known -= group.points.size();
+      r.added.insert(r.added.end(), group.points.begin(), group.points.end());
+    }
+    if (known == 0) r.sum = 0;
+    std::sort(r.added.begin(), r.added.end());
+    KeyTable<std::uint32_t> pieces;
+    for (const std::uint32_t i : r.added) {
+      std::uint32_t& n = pieces.at(group_of(cloud.xyz[i], kPiece));
+      r.cost += cost_of(n + 1) - cost_of(n);
+      ++n;
+    }
+    return r;
+  }
+
+  [[nodiscard]] std::vector<Group> worst_first(const PointCloud& cloud, const std::vector<float>& squares,
+                                               double allowed, int shift) const {
+    KeyTable<std::uint32_t> numbers;  // 1 + index of the group
+    std::vector<Group> groups;
+    for (std::uint32_t i = 0; i < squares.size(); ++i) {
+      if (!is_reached(squares[i])) continue;
+      std::uint32_t& number = numbers.at(group_of(cloud.xyz[i], shift));
+      if (number == 0) {
+        groups.emplace_back();
+        number = static_cast<std::uint32_t>(groups.size());
+      }
+      groups[number - 1].sum += squares[i];
+      groups[number - 1].points.push_back(i);
+    }
+    // What a group goes beyond the promise, for what it costs.
+    const auto gain = [&](const Group& g) {
+      const auto n = static_cast<double>(g.points.size());
+      return (g.sum - allowed * n) / cost_of(n);
+    };
+    std::stable_sort(groups.begin(), groups.end(),
+                     [&](const Group& a, const Group& b) { return gain(a) > gain(b); });
+    return groups;
   }
 
   double rms_m_, side_m_;
@@ -226,23 +268,36 @@ class CellCounts final : public StoredPoints {
       : lattice_{schema.origin, schema.step_m, schema.coordinates.kind} {}
 
   void add(const PointCloud& cloud, bool) override {
-    for (const Vec3& p : cloud.xyz) ++counts_.at(key(p));
+    const std::vector<std::uint64_t> keys = keys_of(cloud);
+    counts_.reserve(cloud.size());
+    for (std::size_t i = 0; i < keys.size(); ++i) {
+      if (i + kAhead < keys.size()) counts_.prefetch(keys[i + kAhead]);
+      ++counts_.at(keys[i]);
+    }
   }
   Novelty look(const PointCloud& cloud, double) const override {
-    KeyTable<std::uint32_t> seen;
+    const std::vector<std::uint64_t> keys = keys_of(cloud);
+    KeyTable<std::uint32_t> seen;  // of cells that are known
+    seen.reserve(cloud.size() / 4);
     Novelty r;
-    for (std::uint32_t i = 0; i < cloud.size(); ++i) {
-      const std::uint64_t k = key(cloud.xyz[i]);
-      const std::uint32_t* stored = counts_.find(k);
-      if (++seen.at(k) > (stored == nullptr ? 0 : *stored)) r.added.push_back(i);
+    for (std::uint32_t i = 0; i < keys.size(); ++i) {
+      if (i + kAhead < keys.size()) counts_.prefetch(keys[i + kAhead]);
+      const std::uint32_t* stored = counts_.find(keys[i]);
+      if (stored == nullptr || ++seen.at(keys[i]) > *stored) r.added.push_back(i);
     }
     return r;
   }
   [[nodiscard]] std::size_t bytes() const override { return counts_.bytes(); }
 
  private:
-  [[nodiscard]] std::uint64_t key(const Vec3& p) const {
-    return pack(lattice_.lattice(p[0], 0), lattice_.lattice(p[1], 1), lattice_.lattice(p[2], 2));
+  static constexpr std::size_t kAhead = 12;  // the table is far larger than any cache
+
+  [[nodiscard]] std::vector<std::uint64_t> keys_of(const PointCloud& cloud) const {
+    std::vector<std::uint64_t> keys;
+    keys.reserve(cloud.size());
+    for (const Vec3& p : cloud.xyz)
+      keys.push_back(pack(lattice_.lattice(p[0], 0), lattice_.lattice(p[1], 1), lattice_.lattice(p[2], 2)));
+    return keys;
   }
   Quantizer lattice_;
   KeyTable<std::uint32_t> counts_;

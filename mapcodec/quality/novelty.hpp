@@ -12,7 +12,7 @@ namespace mapcodec {
 
 /// In shares of an rms promise: what folding pending points may add to their error. The rest of the promise,
 /// squared, is for coding them before, and for points that they stand for.
-inline constexpr double kFoldedShare = 0.95;
+inline constexpr double kFoldedShare = 0.98;
 
 /// New points held against stored ones.
 struct Novelty {
@@ -23,9 +23,9 @@ struct Novelty {
 };
 
 /// Stored points of one tile, ready to be asked. What a point is held against depends on the map's promise:
-///  - rms R: the nearest stored point. Those farther than 2.5 R are new; of the rest the farthest are, until
-///  the
-///    root mean square distance of those left is R: the promise holds for all that came in.
+///  - rms R: the nearest stored point. Those farther than 2.5 R are new; of the rest whole pieces of surface
+///    are, those first that go most beyond R together, until the root mean square distance of those left is
+///    R: the promise holds for all that came in.
 ///  - max_error: the cell of the lattice. As many points of a cell are new as it has more than are stored.
 ///  - lossless: equal position and channels, counted in the same way.
 /// A scan that comes again thus adds nothing. Threads: const methods from many at once.

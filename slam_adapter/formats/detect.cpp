@@ -14,7 +14,8 @@ using namespace std::string_view_literals;
 
 constexpr FormatInfo kInfos[] = {
     {Format::unknown, "unknown",
-     "no known point format begins like this; known are PCD, PLY, LAS, VTK, PTS, PTX, XYZ and KITTI .bin"},
+     "no known point format begins like this; known are PCD, PLY, LAS, LAZ, E57, ROS bags, VTK, PTS, PTX, "
+     "XYZ and KITTI .bin"},
     {Format::pcd, "PCD", nullptr},
     {Format::ply, "PLY", nullptr},
     {Format::las, "LAS", nullptr},
@@ -23,22 +24,28 @@ constexpr FormatInfo kInfos[] = {
     {Format::ptx, "PTX", nullptr},
     {Format::xyz, "XYZ", nullptr},
     {Format::kitti, "KITTI", nullptr},
-    {Format::laz, "LAZ",
-     "unpack it first, for example with 'laszip -i IN.laz -o OUT.las' or 'pdal translate IN.laz OUT.las'"},
+    {Format::laz, "LAZ", nullptr},
     {Format::e57, "E57",
-     "convert it first, for example with 'pdal translate IN.e57 OUT.las' or CloudCompare"},
+     "this build lacks it (MAPCODEC_E57); or convert it first, for example with 'pdal translate IN.e57 "
+     "OUT.las'"},
     {Format::gzip, "gzip", "unpack it first with 'gzip -dk FILE'"},
     {Format::zip, "zip", "unpack it first with 'unzip FILE'"},
     {Format::bzip2, "bzip2", "unpack it first with 'bzip2 -dk FILE'"},
     {Format::xz, "xz", "unpack it first with 'xz -dk FILE'"},
     {Format::zstd, "zstd", "unpack it first with 'zstd -d FILE'"},
     {Format::zlib7, "7z", "unpack it first with '7z x FILE'"},
-    {Format::rosbag, "ROS bag", "export its clouds first with 'rosrun pcl_ros bag_to_pcd FILE TOPIC FOLDER'"},
+    {Format::rosbag, "ROS bag",
+     "this build lacks it (MAPCODEC_ROSBAG); or export its clouds first with 'rosrun pcl_ros bag_to_pcd FILE "
+     "TOPIC FOLDER'"},
     {Format::ros2_db, "ROS 2 bag (sqlite3)",
-     "export its clouds to PCD first, for example with a node of pcl_ros"},
-    {Format::mcap, "MCAP", "export its clouds to PCD first, for example with a node of pcl_ros"},
-    {Format::rawlog, "MRPT rawlog", "export its scans first with MRPT's 'rawlog-edit'"},
-    {Format::simplemap, "MRPT simplemap", "build a point map from it first with MRPT's 'observations2map'"},
+     "make a ROS 1 bag of its folder first with 'rosbags-convert --src FOLDER --dst OUT.bag' (pip install "
+     "rosbags)"},
+    {Format::mcap, "MCAP (ROS 2 bag)",
+     "make a ROS 1 bag of its folder first with 'rosbags-convert --src FOLDER --dst OUT.bag' (pip install "
+     "rosbags)"},
+    {Format::rawlog, "MRPT rawlog", nullptr},
+    {Format::simplemap, "MRPT simplemap", nullptr},
+    {Format::mrpt_object, "MRPT object", nullptr},
     {Format::octomap_bt, "OctoMap .bt", "convert it first with OctoMap's 'octree2pointcloud IN.bt OUT.pcd'"},
     {Format::octomap_ot, "OctoMap .ot",
      "convert it first with OctoMap's 'octree2pointcloud' after 'convert_octree IN.ot OUT.bt'"},
@@ -76,6 +83,21 @@ constexpr Magic kMagics[] = {
     {"\xff\xd8\xff"sv, Format::image},
 };
 
+/// MRPT's objects begin with the name of their class, its length before it.
+Format by_class(std::string_view head) {
+  const std::size_t length = head.empty() ? 0 : static_cast<unsigned char>(head[0]) & 0x7f;
+  if (length < 4 || (static_cast<unsigned char>(head[0]) & 0x80) == 0) return Format::unknown;
+  const std::string_view name = head.substr(1, length);
+  if (name.find("CSimpleMap") != name.npos || name.find("CSensFrameProbSequence") != name.npos)
+    return Format::simplemap;
+  for (const std::string_view part : {"CObservation"sv, "CSensor"sv, "CAction"sv, "CRawlog"sv}) {
+    if (name.find(part) != name.npos) return Format::rawlog;
+  }
+  return name.starts_with("mrpt::") || name.ends_with("Map") || name.find("PointsMap") != name.npos
+             ? Format::mrpt_object
+             : Format::unknown;
+}
+
 /// PCD files begin with comments or with one of these words.
 bool is_pcd(const ByteStream& stream) {
   Cursor cursor(stream);
@@ -98,10 +120,10 @@ Format by_name(const std::string& extension, Format otherwise) {
   static const struct {
     std::string_view extension;
     Format format;
-  } kNames[] = {{".rawlog", Format::rawlog}, {".simplemap", Format::simplemap},
-                {".bag", Format::rosbag},    {".e57", Format::e57},
-                {".laz", Format::laz},       {".bt", Format::octomap_bt},
-                {".ot", Format::octomap_ot}};
+  } kNames[] = {{".rawlog", Format::rawlog},    {".simplemap", Format::simplemap},
+                {".mrpt", Format::mrpt_object}, {".bag", Format::rosbag},
+                {".e57", Format::e57},          {".laz", Format::laz},
+                {".bt", Format::octomap_bt},    {".ot", Format::octomap_ot}};
   for (const auto& n : kNames) {
     if (extension == n.extension) return n.format;
   }
@@ -148,9 +170,12 @@ Format recognise(const ByteStream& stream, const std::string& name) {
   for (const Magic& m : kMagics) {
     if (!head.starts_with(m.bytes)) continue;
     if (m.format == Format::las) return is_laz(stream) ? Format::laz : Format::las;
-    return m.format == Format::gzip ? by_name(extension, Format::gzip) : m.format;
+    if (m.format != Format::gzip) return m.format;
+    return by_name(extension == ".gz" ? extension_of(name.substr(0, name.size() - 3)) : extension,
+                   Format::gzip);
   }
   if (is_ply(head)) return Format::ply;
+  if (const Format f = by_class(head); f != Format::unknown) return f;
   if (is_pcd(stream)) return Format::pcd;
   if (const auto shape = recognise_text(stream)) {
     const bool lone_count = *shape == TextShape::pts;

@@ -31,6 +31,7 @@ enum class Format {
   mcap,
   rawlog,
   simplemap,
+  mrpt_object,
   octomap_bt,
   octomap_ot,
   pcap,

@@ -9,6 +9,7 @@
 
 #include "mapcodec/base/bytes.hpp"
 #include "mapcodec/cloud/point_stream.hpp"
+#include "slam_adapter/formats/bag_options.hpp"
 
 namespace mapcodec {
 
@@ -18,22 +19,24 @@ struct ReadOptions {
   /// Metres per unit of the file: multiplies x, y, z (3DTK's centimetres: 0.01). Anything but 1 makes the
   /// coordinates f64, since a product is no longer a number that the file stored.
   double unit_m = 1;
+  BagOptions bag;
 };
 
 /// Opens a point file as blocks of at most 65,536 points.
 ///
-/// The format is recognised by content (PCD, PLY, LAS, VTK legacy, PTS, PTX, columns of numbers); the name
-/// decides only where content is silent (KITTI .bin). A folder of 3DTK scans (scanNNN.3d with scanNNN.pose)
-/// is opened as one cloud with the poses applied, left-handed and in the files' unit; a single .3d file is
-/// read as it lies. Coordinates are f32, f64 or fixed as the file stores them; text without a declared type
-/// is f64. Channels: packed PCD colour becomes "rgb" (u8x3: red, green, blue) and "alpha" (its fourth byte);
+/// The format is recognised by content (PCD, PLY, LAS, LAZ, E57, ROS 1 bags, VTK legacy, PTS, PTX, columns of
+/// numbers); the name decides only where content is silent (KITTI .bin). A folder of 3DTK scans (scanNNN.3d
+/// with scanNNN.pose) is opened as one cloud with the poses applied, left-handed and in the files' unit; a
+/// single .3d file is read as it lies. So is a map folder of Autoware (pointcloud_map_metadata.yaml with its
+/// tiles). Coordinates are f32, f64 or fixed as the file stores them; text without a declared type is f64.
+/// Channels: packed PCD colour becomes "rgb" (u8x3: red, green, blue) and "alpha" (its fourth byte);
 /// red/green/blue become "rgb"; normal_x/y/z and nx/ny/nz become "normal"; the bits of LAS flags become u8
 /// channels; other names stay. Text columns are judged by their first 4,096 lines. Lines beyond the number
 /// that a PTS file announces are left out with a warning (such files are common); elsewhere data beyond the
 /// announced points are Malformed. PTX cells of 0 0 0 ("no return") count as dropped whatever
 /// `keep_nonfinite` says.
 /// Every error message begins with the path. Errors: NotFound, Unreadable (directory, permission), Empty (no
-/// byte, no point), Truncated, Malformed (with line or byte), Unsupported (LAZ, E57, zipped, ROS bags, ...:
+/// byte, no point), Truncated, Malformed (with line or byte), Unsupported (zipped, ROS 2 bags, ...:
 /// says what to run first). What is wrong beyond the header comes from `next`. Threads: one at a time per
 /// source.
 [[nodiscard]] Result<std::unique_ptr<PointSource>> open_source(const std::string& path,
@@ -69,11 +72,12 @@ struct WriteOptions {
 /// What writing `layout` to `path` would lose or change, one sentence each; empty if nothing.
 [[nodiscard]] std::vector<std::string> unwritten_channels(const std::string& path, const PointCloud& layout);
 
-/// "PCD", "PLY", "LAS", "VTK", "PTS", "PTX", "XYZ", "KITTI", "3DTK"; also formats that are known but not
-/// read: "LAZ", "E57", "gzip", ... Errors: NotFound, Unreadable, Empty, Unsupported (not recognised).
+/// "PCD", "PLY", "LAS", "LAZ", "E57", "ROS bag", "VTK", "PTS", "PTX", "XYZ", "KITTI", "3DTK", "Autoware";
+/// also formats that are known but not read: "gzip", "MCAP (ROS 2 bag)", ... Errors: NotFound, Unreadable,
+/// Empty, Unsupported (not recognised).
 [[nodiscard]] Result<std::string> detect_format(const std::string& path);
 
-/// Size of the file, or of the scans in a 3DTK folder [bytes]. Errors: NotFound, Unreadable.
+/// Size of the file, or of the scans or tiles in a folder [bytes]. Errors: NotFound, Unreadable.
 [[nodiscard]] Result<std::uint64_t> input_bytes(const std::string& path);
 
 }  // namespace mapcodec

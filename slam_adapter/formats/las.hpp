@@ -6,7 +6,7 @@
 
 namespace mapcodec {
 
-/// Errors: Truncated, Malformed, Empty, Unsupported (LAZ; LAS 2).
+/// Errors: Truncated, Malformed, Empty, Unsupported (LAZ, see laz.hpp; LAS 2).
 [[nodiscard]] ReaderResult open_las(const ByteStream& stream);
 /// Whether a LAS header's point format is one of the compressed ones.
 [[nodiscard]] bool is_laz(const ByteStream& stream);

@@ -17,23 +17,6 @@ std::string text(const char* format, double v) {
   return buffer;
 }
 
-/// Keeps the finite points, moving them to the front run by run.
-void drop_nonfinite(PointCloud& block) {
-  std::size_t n = 0;
-  for (std::size_t begin = 0; begin < block.size();) {
-    std::size_t end = begin;
-    while (end < block.size() && is_finite(block.xyz[end])) ++end;
-    const std::size_t run = end - begin;
-    if (run > 0 && n != begin) {
-      std::memmove(&block.xyz[n], &block.xyz[begin], run * sizeof(Vec3));
-      for (Channel& c : block.channels) std::memmove(c.at(n), c.at(begin), run * c.info.stride());
-    }
-    n += run;
-    begin = end + 1;
-  }
-  block.resize(n);
-}
-
 bool same_layout(const PointCloud& a, const PointCloud& b) {
   return a.coordinates == b.coordinates &&
          std::equal(a.channels.begin(), a.channels.end(), b.channels.begin(), b.channels.end(),
@@ -111,13 +94,7 @@ class RecordSource final : public NamedSource {
       if (finite && m > largest) largest = m;
     }
     largest_ = largest;
-    if (!all_finite && !options_.keep_nonfinite) drop(block);
-  }
-
-  void drop(PointCloud& block) {
-    const std::size_t before = block.size();
-    drop_nonfinite(block);
-    dropped_ += before - block.size();
+    if (!all_finite && !options_.keep_nonfinite) dropped_ += drop_nonfinite(block);
   }
 
   void scale(PointCloud& block) const {
@@ -154,6 +131,24 @@ Error size_error(ErrorCode code, const Cursor& cursor, std::uint64_t count, std:
 }
 
 }  // namespace
+
+std::size_t drop_nonfinite(PointCloud& block) {
+  const std::size_t before = block.size();
+  std::size_t n = 0;  // moved to the front run by run
+  for (std::size_t begin = 0; begin < block.size();) {
+    std::size_t end = begin;
+    while (end < block.size() && is_finite(block.xyz[end])) ++end;
+    const std::size_t run = end - begin;
+    if (run > 0 && n != begin) {
+      std::memmove(&block.xyz[n], &block.xyz[begin], run * sizeof(Vec3));
+      for (Channel& c : block.channels) std::memmove(c.at(n), c.at(begin), run * c.info.stride());
+    }
+    n += run;
+    begin = end + 1;
+  }
+  block.resize(n);
+  return before - n;
+}
 
 std::unique_ptr<PointSource> make_source(std::unique_ptr<ByteStream> stream,
                                          std::unique_ptr<RecordReader> reader, std::string name,

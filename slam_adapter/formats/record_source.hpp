@@ -41,6 +41,9 @@ class NamedSource : public PointSource {
                                                        std::unique_ptr<RecordReader> reader, std::string name,
                                                        const ReadOptions& options);
 
+/// Takes out the points with a NaN or infinite coordinate; returns their number.
+std::size_t drop_nonfinite(PointCloud& block);
+
 /// `error` with the file's name before the message.
 [[nodiscard]] Error named(const std::string& name, Error error);
 

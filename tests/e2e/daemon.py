@@ -118,6 +118,10 @@ class DaemonTest(unittest.TestCase):
         self.addCleanup(channel.close)
         self.stub = rpc.MapServiceStub(channel)
 
+    def files(self):
+        """Names of what lies in the folder beside the daemon's catalogue."""
+        return [p.name for p in self.data.iterdir() if not p.name.startswith("catalogue.db")]
+
     def create(self, name="m", **fields):
         fields.setdefault("promise", pb.CreateMapRequest.MAX_ERROR)
         fields.setdefault("promise_m", 0.01)

@@ -64,6 +64,21 @@ class Surfaces(ProgramTest):
         self.assertEqual(outs[0], outs[1])
         self.assertEqual(outs[0], outs[2])
 
+    def test_surfaces_with_color_are_the_same_on_any_threads(self):
+        for promise in (("--rms", 0.014, "--codec", "surface", "--color-error", 40), ("--rms", 0.02), ("--target-bpp", 1.5)):
+            flags = (*promise, "--tile-size", 1)
+            one, *others = [self.compress(self.source, *flags, "--threads", t, name=f"{t}.mapc").read_bytes() for t in (1, 2, 8)]
+            for other in others:
+                self.assertEqual(one, other, promise)
+            report = self.succeeds("info", self.path("1.mapc"), "--json").json
+            self.assertGreater(report["tiles"], 4)
+            clouds = [self.decompress(self.path("1.mapc"), "--threads", t, name=f"{t}.pcd").read_bytes() for t in (1, 2, 8)]
+            self.assertEqual(clouds[0], clouds[1])
+            self.assertEqual(clouds[0], clouds[2])
+            for t in (1, 2, 8):
+                self.path(f"{t}.mapc").unlink()
+                self.path(f"{t}.pcd").unlink()
+
     def test_cylinders_of_a_room_are_none(self):
         outcome = run("decompress", self.map, "-o", self.path("c.json"), "--as", "planes", "--cylinders")
         if outcome.code != 0 and "CGAL" in outcome.err:

@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Runs a fuzz target without libFuzzer: over the seeds given and deterministic mutations of each (cuts,
 // flipped bits, overwritten words, inserted and removed runs), so that every build checks what the fuzzers
-// check. Usage: fuzz_<name> FOLDER_OR_FILE...
+// check. Usage: fuzz_<name> FOLDER_OR_FILE...   $MAPCODEC_FUZZ_SECONDS: as many mutations as fit into so
+// many.
 #include <algorithm>
 #include <chrono>
 #include <cstdint>
 #include <cstdio>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -21,6 +23,12 @@ using Input = std::vector<std::uint8_t>;
 constexpr std::size_t kMutationsPerSeed = 400;
 constexpr std::chrono::seconds kBudget{
     20};  // for all seeds; a slow machine runs fewer mutations, never other ones
+
+/// 0: the ordinary test.
+int asked_seconds() {
+  const char* text = std::getenv("MAPCODEC_FUZZ_SECONDS");
+  return text == nullptr ? 0 : std::atoi(text);
+}
 
 void run(const Input& input) {
   LLVMFuzzerTestOneInput(input.data(), input.size());
@@ -87,7 +95,8 @@ std::size_t run_mutations(const Input& seed, std::uint64_t number,
                           std::chrono::steady_clock::time_point end) {
   std::mt19937_64 random(number);
   std::size_t done = 0;
-  for (; done < kMutationsPerSeed && std::chrono::steady_clock::now() < end; ++done) {
+  const std::size_t most = asked_seconds() > 0 ? SIZE_MAX : kMutationsPerSeed;
+  for (; done < most && std::chrono::steady_clock::now() < end; ++done) {
     Input input = seed;
     for (std::size_t n = 1 + random() % 4; n > 0; --n) mutate(input, random);
     run(input);
@@ -104,7 +113,8 @@ int main(int argc, char** argv) {
   std::size_t runs = 1;
   for (const auto& file : files) run(read(file)), ++runs;
   for (std::size_t i = 0; i < files.size(); ++i) {
-    const auto share = kBudget * static_cast<int>(i + 1) / static_cast<int>(files.size());
+    const auto budget = asked_seconds() > 0 ? std::chrono::seconds(asked_seconds()) : kBudget;
+    const auto share = budget * static_cast<int>(i + 1) / static_cast<int>(files.size());
     runs += run_mutations(read(files[i]), i + 1, start + share);
   }
   std::printf("%zu seeds, %zu inputs, nothing found\n", files.size(), runs);

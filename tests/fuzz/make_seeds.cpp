@@ -11,12 +11,16 @@
 
 #include "mapcodec/attribute/channel_encoder.hpp"
 #include "mapcodec/codec/lossless_encoder.hpp"
+#include "mapcodec/codec/occupancy_encoder.hpp"
 #include "mapcodec/codec/points_encoder.hpp"
 #include "mapcodec/codec/surface_encoder.hpp"
 #include "mapcodec/codec/tile_segments.hpp"
 #include "mapcodec/geometry/morton.hpp"
 #include "maps/map_writer.hpp"
+#include "tests/fuzz/file_seeds.hpp"
+#include "slam_adapter/octomap/octree_file.hpp"
 #include "tests/fuzz/seeds.hpp"
+#include "tests/unit/occupancy_support.hpp"
 
 namespace mapcodec::fuzz {
 namespace {
@@ -47,6 +51,24 @@ void points_seeds(SeedFolder& folder) {
       folder.write("points", seed);
     }
   }
+}
+
+void octree_seeds(SeedFolder& folder) {
+  for (const OccupancyKind kind : test::kAllKinds) {
+    for (const double radius : {1.5, 4.0}) {
+      const OccupancyTree tree = test::bubble(kind, radius);
+      folder.write("occupancy", encode_occupancy_tile({{0, 0, 0, 16}, tree}, 0.1).bytes);
+      folder.write("octree", format_octree(tree, 0.1, OctreeFormat::bt));
+      folder.write("octree", format_octree(tree, 0.1, OctreeFormat::ot));
+    }
+  }
+  OccupancyTree odd = test::bubble(OccupancyKind::color, 2);
+  odd.levels[2].node_values.front() = 0x7fc00000;  // inner nodes that are not what their children say
+  odd.levels[1].node_colors.front() = {1, 2, 3};
+  folder.write("occupancy", encode_occupancy_tile({{0, 0, 0, 16}, odd}, 0.1).bytes);
+  OccupancyTree leaf;
+  leaf.root = Cell::free;
+  folder.write("occupancy", encode_occupancy_tile({{0, 0, 0, 16}, leaf}, 0.1).bytes);
 }
 
 /// Byte 0: level; then a payload of several segments (segments_fuzz.cpp).
@@ -157,11 +179,15 @@ int main(int argc, char** argv) {
   mapcodec::fuzz::points_seeds(folder);
   mapcodec::fuzz::surface_seeds(folder);
   mapcodec::fuzz::segment_seeds(folder);
+  mapcodec::fuzz::octree_seeds(folder);
   mapcodec::fuzz::channel_seeds(folder);
   mapcodec::fuzz::lossless_seeds(folder);
   mapcodec::fuzz::archive_seed(folder, 1, 1);
   mapcodec::fuzz::archive_seed(folder, 5, 1);
   mapcodec::fuzz::archive_seed(folder, 3, 2);
+#ifdef MAPCODEC_FILE_SEEDS
+  mapcodec::fuzz::file_seeds(folder);
+#endif
   std::printf("%zu seeds in %s\n", folder.count(), argv[1]);
   return folder.good() ? 0 : 1;
 }

@@ -368,10 +368,10 @@ TEST(Unsupported, SaysWhatToRunFirst) {
     std::string bytes;
     const char *name, *part;
   } kCases[] = {{"\x1f\x8b\x08 and so on", "map.pcd.gz", "gzip -dk"},
-                {"ASTM-E57xxxxxxxx", "a.e57", "E57"},
+                {"\x89MCAP0\r\n", "a.mcap", "rosbags-convert"},
                 {"PK\x03\x04zzzz", "a.ply", "zip"},
                 {"BZh91AY", "a", "bzip2"},
-                {"#ROSBAG V2.0\n", "a.bag", "ROS bag"},
+                {"SQLite format 3", "a.db3", "rosbags-convert"},
                 {"# Octomap OcTree binary file\n", "a.bt", "octree2pointcloud"},
                 {"\x28\xb5\x2f\xfd...", "a.zst", "zstd"},
                 {"\x1f\x8b\x08", "a.rawlog", "rawlog"}};

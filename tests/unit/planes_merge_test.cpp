@@ -9,6 +9,7 @@
 
 #include "slam_adapter/cylinders.hpp"
 #include "slam_adapter/level_errors.hpp"
+#include "slam_adapter/mesh_orient.hpp"
 #include "slam_adapter/mesh_weld.hpp"
 #include "slam_adapter/plane_merge.hpp"
 #include "slam_adapter/planes_json.hpp"
@@ -118,6 +119,32 @@ TEST(MeshWeld, LargeAndSmallCellsClose) {
   const SurfaceMesh mesh = weld_patches(patches, 0.01);
   // Around both together: 3 long edges, 4 short ones, and two short sides of the strip.
   EXPECT_EQ(open_edges(mesh), 3u + 4u + 2u);
+}
+
+TEST(MeshOrient, NeighborsShowOneSide) {
+  // A floor and a wall that meet in an edge, a third of the patches seen from behind.
+  std::vector<SurfacePatch> patches = floor_of(4, {0, 0, 0}, 0, kNone);
+  for (int i = 0; i < 4; ++i) patches.push_back(quad({0.5 * i, 0, 0}, {0, 0, 0.5}, {0.5, 0, 0}));
+  for (std::size_t i = 0; i < patches.size(); i += 3) {
+    std::reverse(patches[i].polygon.begin(), patches[i].polygon.end());
+    for (double& x : patches[i].normal) x = -x;
+  }
+  SurfaceMesh mesh = weld_patches(patches, 0.01);
+  const std::size_t faces = mesh.faces.size();
+  orient_faces(mesh);
+  ASSERT_EQ(mesh.faces.size(), faces);
+  std::map<std::array<std::uint32_t, 2>, int> edges;
+  for (const auto& f : mesh.faces) {
+    for (std::size_t i = 0; i < 3; ++i) ++edges[{f[i], f[(i + 1) % 3]}];
+    const Vec3 up = cross(minus(mesh.vertices[f[1]], mesh.vertices[f[0]]),
+                          minus(mesh.vertices[f[2]], mesh.vertices[f[0]]));
+    EXPECT_GE(up[2], 0);  // two thirds of the floor looked up
+    EXPECT_GE(up[1], 0);
+  }
+  for (const auto& [edge, times] : edges) EXPECT_EQ(times, 1);
+  SurfaceMesh none;
+  orient_faces(none);
+  EXPECT_TRUE(none.faces.empty());
 }
 
 TEST(MeshWeld, TintsFollowThePatches) {

@@ -55,6 +55,23 @@ TEST(Density, EqualsTheDefinition) {
   }
 }
 
+TEST(Density, OfMovedPointsIsTheSame) {
+  for (const double moved : {0.0, 0.02, 0.3, 1e9}) {
+    const double lattice = moved == 0.02 ? 0.025 : 0;  // then points lie on the faces of voxels
+    const PointCloud a = random_cloud(4000, 3, {5e5, 4.9e6, 2300}, 1, lattice),
+                     by = random_cloud(4000, moved, {0, 0, 0}, 2);
+    std::vector<Vec3> b;
+    std::vector<std::uint32_t> order;
+    for (std::uint32_t i = 0; i < 4000; ++i) {
+      order.push_back((i * 7919) % 4000);
+      const Vec3 &p = a.xyz[order.back()], &d = by.xyz[i];
+      b.push_back({p[0] + d[0], p[1] + d[1], p[2] + d[2]});
+    }
+    EXPECT_EQ(density_error_of_moved(a.xyz, b, order), density_error(a.xyz, b));
+  }
+  EXPECT_TRUE(std::isnan(density_error_of_moved({}, {}, {})));
+}
+
 TEST(Density, CellsFarFromEachOther) {
   const PointCloud a = random_cloud(3000, 1e7, {0, 0, 0}, 1);
   std::vector<Vec3> b(a.xyz.begin() + 1000, a.xyz.end());

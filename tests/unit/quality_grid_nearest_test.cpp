@@ -2,6 +2,8 @@
 // The grid's nearest neighbours against the k-d tree's: exactly as near.
 #include <gtest/gtest.h>
 
+#include <numeric>
+
 #include "mapcodec/quality/grid_nearest.hpp"
 #include "tests/unit/points_support.hpp"
 
@@ -45,6 +47,21 @@ TEST(GridNearest, IsExactFarAway) {
   const Cloud mixed = joined(joined(room(3000, 0.05, 8), sparse(300, 20, 9)), {{1e5, 1e5, 1e5}});
   expect_exact(mixed, joined(room(2000, 0.05, 10), sparse(200, 30, 11)));
   expect_exact(joined(room(2000, 0.05, 10), sparse(200, 30, 11)), mixed);
+}
+
+TEST(GridNearest, EstimatesFromAPartOfThePoints) {
+  const Cloud a = room(90000, 2, 1), b = room(70000, 2, 2);
+  const NearestPair exact = find_nearest_pair(a, b);
+  const RoughErrors rough = estimate_errors(a, b);
+  const auto mean = [](const Nearest& n) {
+    return std::accumulate(n.squared.begin(), n.squared.end(), 0.0) / double(n.squared.size());
+  };
+  EXPECT_NEAR(rough.forth / mean(exact.forth), 1, 0.04);
+  EXPECT_NEAR(rough.back / mean(exact.back), 1, 0.04);
+  // Of few points all are asked.
+  const Cloud few(a.begin(), a.begin() + 5000);
+  const NearestPair exact_few = find_nearest_pair(few, few);
+  EXPECT_DOUBLE_EQ(estimate_errors(few, few).forth, mean(exact_few.forth));
 }
 
 TEST(GridNearest, DegenerateClouds) {

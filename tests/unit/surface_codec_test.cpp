@@ -131,6 +131,27 @@ MapSchema schema_of(const PointCloud& c, double step, double color_bound) {
   return s;
 }
 
+TEST(SurfaceTile, RoughErrorsChangeNoByte) {
+  const PointCloud cloud = colored(room(40000, 3, 1));
+  MapSchema schema = schema_of(cloud, 0.03, 8);
+  for (const CodecId codec : {CodecId::surface, CodecId::points}) {
+    TileSettings tile;
+    tile.codec = codec;
+    for (const bool with_channels : {true, false}) {
+      tile.rough_errors = false;
+      const auto exact = encode_tile(cloud, schema, tile);
+      tile.rough_errors = true;
+      const auto rough = encode_tile(cloud, schema, tile);
+      ASSERT_TRUE(exact.ok() && rough.ok());
+      EXPECT_EQ(exact->bytes, rough->bytes);
+      EXPECT_NEAR(rough->errors.rms_m / exact->errors.rms_m, 1, 0.03);
+      if (with_channels) EXPECT_EQ(rough->errors.color_error, exact->errors.color_error);
+      for (ChannelSchema& c : schema.channels) c.kept = ChannelKept::dropped;
+    }
+    schema = schema_of(cloud, 0.03, 8);
+  }
+}
+
 TEST(SurfaceTile, MeasuresWhatItsDecoderGives) {
   SerialRunner serial;
   EvaluationSettings settings;

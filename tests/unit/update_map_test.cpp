@@ -11,6 +11,7 @@
 #include "mapcodec/cloud/cloud_source.hpp"
 #include "mapcodec/quality/evaluation.hpp"
 #include "maps/compaction.hpp"
+#include "parallel/runner.hpp"
 #include "slam_adapter/create_map.hpp"
 #include "slam_adapter/map_file.hpp"
 #include "slam_adapter/map_updater.hpp"
@@ -285,6 +286,71 @@ TEST_P(Living, NothingCountsBeforeCommit) {
   }
   EXPECT_EQ(all().size(), before);
   EXPECT_TRUE(insert(room(30, 4)).committed);
+}
+
+TEST_P(Living, WhatFailedHalfWayIsNeverCommitted) {
+  create();
+  const Bytes before = file();
+  const std::atomic<bool> stop = true;
+  UpdateSettings settings;
+  settings.stop = &stop;
+  auto map = MapUpdater::open(path_, arena_, settings);
+  ASSERT_TRUE(map->insert(room(30, 4)).ok());
+  EXPECT_EQ(map->flush().error().code, ErrorCode::kCancelled);
+  EXPECT_EQ(map->commit(9).error().code, ErrorCode::kCancelled);
+  EXPECT_EQ(file(), before);
+}
+
+/// Whether `b` lies within the cube of `a`.
+bool holds(const TileKey& a, const TileKey& b) {
+  const int up = a.level - b.level;
+  return up >= 0 && b.x >> up == a.x && b.y >> up == a.y && b.z >> up == a.z;
+}
+
+/// A scanner that stands still fills its tiles far beyond what they were made for.
+TEST_P(Living, TilesThatGrowAreSplit) {
+  const PointCloud scan = room(0, 1, 2000);
+  UpdateSettings settings;
+  settings.split_points = 1000;
+  settings.density_cap = false;
+  for (const double color_error :
+       {0.0, 10.0}) {  // exact colours: the parts stay pending; else they are folded
+    CompressOptions o = options();
+    o.tile_size_m = 0;
+    o.color_error = color_error;
+    o.overwrite = true;
+    PointCloud whole = scan.like();
+    std::uint64_t split = 0;
+    {
+      CloudSource first(scan);
+      std::vector<std::string> warnings;
+      auto map = create_map(path_, first, o, arena_, settings, warnings);
+      ASSERT_TRUE(map.ok()) << map.error().message;
+      for (unsigned seed = 1; seed <= 3; ++seed) {
+        whole.append(room(0, seed, 2000));
+        ASSERT_TRUE(map->insert(room(0, seed, 2000)).ok());
+        const auto r = map->commit(seed);
+        ASSERT_TRUE(r.ok()) << r.error().message;
+        split += r->tiles_split;
+      }
+    }
+    EXPECT_GT(split, 0u);
+    const auto map = MapFile::open(path_);
+    ASSERT_TRUE(map.ok());
+    for (const TileRecord& a : map->archive().tiles())
+      for (const TileRecord& b : map->archive().tiles()) EXPECT_TRUE(a.key == b.key || !holds(a.key, b.key));
+    fold();
+    SerialRunner runner;
+    const auto e = evaluate(whole, all(), runner, {});
+    ASSERT_TRUE(e.ok());
+    EXPECT_EQ(e->points_decoded, whole.size());
+    EXPECT_LE(e->rms_m, GetParam() == PromiseKind::max_error ? 0.02 * std::sqrt(3.0) : 0.02);
+    EXPECT_LE(e->color_error, color_error * 1.05 + 1);  // of two points at one place either is the nearest
+    EXPECT_LE(e->max_m, GetParam() == PromiseKind::lossless ? 0 : 1);
+    // Later scans go into the parts, and what is known adds nothing.
+    EXPECT_EQ(insert(room(0, 9, 2000), 2, settings).tiles_new, 0u);
+    EXPECT_EQ(insert(scan).points_added, 0u);
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(Promises, Living,

@@ -33,6 +33,9 @@ struct BenchSettings {
 /// Surfaces, points and the choice between them at promises around each cloud's spacing, and the surface
 /// codec's goals (surface.json, surface.md).
 [[nodiscard]] Status bench_surface(const BenchSettings& settings);
+/// What cutting into tiles costs: bits and RMS of the map in one tile, in tiles of the usual size and in
+/// smaller ones, near the borders and inside (seams.json, seams.md).
+[[nodiscard]] Status bench_seams(const BenchSettings& settings);
 /// The experiments of Morell et al. 2014 on our data (paper.json, paper.md, paper_*.png).
 [[nodiscard]] Status bench_paper(const BenchSettings& settings);
 
@@ -40,10 +43,17 @@ struct BenchSettings {
 /// one (local.json, local.md). `files` chooses: "tiles", "drive", and sequences by parts of their names.
 [[nodiscard]] Status bench_local(const BenchSettings& settings);
 
+/// Bags, LAZ, COPC, E57 and Autoware folders: read, compressed without loss, written, compared (formats.json,
+/// formats.md). A file that is refused is a row with its message.
+[[nodiscard]] Status bench_formats(const BenchSettings& settings);
+
 /// Maps built scan after scan beside maps made at once, and points taken in by a large map while it is read
 /// (update.json, update.md). `quick`: a map of 5 instead of 50 million points.
 [[nodiscard]] Status bench_update(const BenchSettings& settings);
 
+/// Octrees (.bt, .ot) and OctoMap's scan.dat: size beside zstd, time beside OctoMap, leaf by leaf the same, and a box
+/// out of a large map (octomap.json, octomap.md). Errors: also PromiseBroken (a leaf differs); Unsupported (no OctoMap).
+[[nodiscard]] Status bench_octomap(const BenchSettings& settings);
 /// A mapcodecd under load: tiles beside a bare gRPC stream, copies that follow, writers and readers, memory
 /// over minutes (service.json, service.md, service_soak.png). There where the service is built.
 [[nodiscard]] Status bench_service(const BenchSettings& settings);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "tools/bench/codec_run.hpp"
 
+#include <cmath>
 #include <filesystem>
 #include <numeric>
 
@@ -55,6 +56,9 @@ Result<CodecRun> run_codec(const PointCloud& cloud, const CompressOptions& optio
     run.surface_share = static_cast<double>(surface->second.points) / static_cast<double>(summary.points);
   }
   run.archive_bytes = summary.bytes;
+  run.stated_farthest_m = std::sqrt(3.0) * summary.achieved.max_axis_error_m;
+  run.tile_size_m = map.schema().tile_size_m;
+  run.origin = map.schema().origin;
   run.raw_bytes = summary.raw_bytes;
   run.encode_seconds = sum(run.report.tile_seconds);
   run.decode_seconds = sum(run.tile_decode_seconds);

@@ -18,6 +18,9 @@ struct CodecRun {
   double decode_seconds = 0;                ///< the same for decoding, fetching included
   std::vector<double> tile_decode_seconds;  ///< in Morton order
   double surface_share = 0;                 ///< of the points, those in `surface` tiles
+  double stated_farthest_m = 0;             ///< what the archive says that no point is farther off than
+  double tile_size_m = 0;
+  Vec3 origin{};  ///< where tiles begin
   PointCloud decoded;
 };
 

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "mapcodec/quality/evaluation.hpp"
+#include "mapcodec/quality/grid_nearest.hpp"
 #include "parallel/runner.hpp"
 #include "slam_adapter/tile_sample.hpp"
 #include "tools/bench/bench.hpp"
@@ -56,10 +57,20 @@ struct Row {
   std::string codec;
   double promise_m = 0, bits = 0, channel_bits = 0, rms_m = 0, density = 0, color = 0, ratio = 0;
   double surface_share = 0, encode_mpps = 0, decode_mpps = 0, seconds = 0;
+  double farthest_m = 0, stated_m = 0;  ///< of an original point to the decoded cloud
   std::uint64_t tiles = 0;
   int codings = 0;
-  bool kept = false, count_kept = false;
+  bool kept = false, count_kept = false, near = false;
 };
+
+/// An original point may lie this many promises off, or as far as the archive says.
+constexpr double kFarPromises = 10;
+
+double farthest_of(const PointCloud& cloud, const PointCloud& decoded) {
+  const GridNearest index(decoded.xyz);
+  const Nearest nearest = index.find(cloud.xyz, GridNearest(cloud.xyz).order());
+  return std::sqrt(*std::max_element(nearest.squared.begin(), nearest.squared.end()));
+}
 
 PointCloud unique_points(const PointCloud& cloud) {
   std::vector<std::uint32_t> order(cloud.size());
@@ -104,6 +115,9 @@ class SurfaceBench {
     r.color = v.color_error;
     r.kept = v.rms_m <= rms_m;
     r.count_kept = run.decoded.size() == cloud.size();
+    r.farthest_m = farthest_of(cloud, run.decoded);
+    r.stated_m = run.stated_farthest_m;
+    r.near = r.farthest_m <= std::max(kFarPromises * rms_m, r.stated_m);
     r.surface_share = run.surface_share;
     r.tiles = run.tile_decode_seconds.size();
     r.codings = run.report.codings;
@@ -116,16 +130,16 @@ class SurfaceBench {
   void show_head(const std::string& what) {
     print("");
     print(what);
-    print(fmt::format("{:>8} {:>8} {:>8} {:>8} {:>5} {:>7} {:>5} {:>8} {:>7} {:>7} {:>6}", "RMS mm", "codec",
-                      "bits", "got mm", "kept", "density", "tiles", "surface", "enc M/s", "dec M/s",
-                      "codings"));
+    print(fmt::format("{:>8} {:>8} {:>8} {:>8} {:>5} {:>7} {:>8} {:>5} {:>8} {:>7} {:>7} {:>6}", "RMS mm",
+                      "codec", "bits", "got mm", "kept", "density", "farthest", "tiles", "surface", "enc M/s",
+                      "dec M/s", "codings"));
   }
   void show(const Row& r, const std::string& remark) {
-    print(fmt::format("{:>8} {:>8} {:>8} {:>8} {:>5} {:>7} {:>5} {:>7.0f}% {:>7} {:>7} {:>6} {}",
+    print(fmt::format("{:>8} {:>8} {:>8} {:>8} {:>5} {:>7} {:>8} {:>5} {:>7.0f}% {:>7} {:>7} {:>6} {}",
                       digits(r.promise_m * 1e3), r.codec, digits(r.bits), digits(r.rms_m * 1e3),
-                      r.kept && r.count_kept ? "yes" : "NO", digits(r.density), r.tiles,
-                      100 * r.surface_share, digits(r.encode_mpps), digits(r.decode_mpps), r.codings,
-                      remark));
+                      r.kept && r.count_kept && r.near ? "yes" : "NO", digits(r.density),
+                      digits(r.farthest_m * 1e3), r.tiles, 100 * r.surface_share, digits(r.encode_mpps),
+                      digits(r.decode_mpps), r.codings, remark));
   }
   static Json json(const Row& r) {
     return {{"codec", r.codec},
@@ -136,6 +150,8 @@ class SurfaceBench {
             {"rms_m", r.rms_m},
             {"promise_kept", r.kept},
             {"count_kept", r.count_kept},
+            {"farthest_m", r.farthest_m},
+            {"stated_farthest_m", r.stated_m},
             {"density_error", r.density},
             {"color_error", std::isfinite(r.color) ? Json(r.color) : Json(nullptr)},
             {"surface_share", r.surface_share},

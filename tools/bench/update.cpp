@@ -235,7 +235,9 @@ Status bench_update(const BenchSettings& settings) {
   }
   std::error_code ignored;
   std::filesystem::remove_all(scratch, ignored);
-  if (settings.files.empty()) MAPCODEC_TRY(bench::measure_ingest(settings, report));
+  const bool ingest = settings.files.empty() || std::find(settings.files.begin(), settings.files.end(),
+                                                          "ingest") != settings.files.end();
+  if (ingest) MAPCODEC_TRY(bench::measure_ingest(settings, report));
   std::filesystem::remove(report.scratch(), ignored);
   return report.finish();
 }

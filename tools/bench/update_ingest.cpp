@@ -3,6 +3,7 @@
 
 #include <atomic>
 #include <filesystem>
+#include <fstream>
 #include <random>
 #include <thread>
 
@@ -74,9 +75,26 @@ Status fill(MapUpdater& map, const PointCloud& scan, std::uint64_t points) {
   return r.ok() ? Status{} : Status(r.error());
 }
 
+/// Peak memory of the process from now on.
+void forget_peak() {
+  std::ofstream("/proc/self/clear_refs") << 5;
+}
+
+/// @param which  "VmHWM:" for the peak, "VmRSS:" for what is used now.
+double megabytes(const char* which) {
+  std::ifstream status("/proc/self/status");
+  for (std::string word; status >> word;) {
+    double kilobytes = 0;
+    if (word == which && status >> kilobytes) return kilobytes / 1024;
+  }
+  return 0;
+}
+
 struct Ingest {
   double points_per_second = 0;
-  std::vector<double> commits;  ///< [s] from the scan to its revision on the disk
+  double points_per_processor_second = 0;  ///< of the whole process: other programs do not stretch it
+  double peak_mb = 0, before_mb = 0;       ///< before: the scans, which wait in memory, and the program
+  std::vector<double> commits;             ///< [s] from the scan to its revision on the disk
   std::uint64_t added = 0, bytes = 0;
 };
 
@@ -86,7 +104,9 @@ Result<Ingest> ingest(MapUpdater& map, const PointCloud& scan, int scans, double
   std::uint64_t points = 0;
   std::vector<PointCloud> all;
   for (int i = 0; i < scans; ++i) all.push_back(scan_at(scan, 0.5 * kStride * i, unsigned(100000 + i)));
-  const Watch watch(Watch::Kind::wall);
+  forget_peak();
+  r.before_mb = megabytes("VmRSS:");
+  const Watch watch(Watch::Kind::wall), work(Watch::Kind::whole_process);
   for (PointCloud& c : all) {
     const double early = period_s * double(r.commits.size()) - watch.seconds();
     if (early > 0) std::this_thread::sleep_for(std::chrono::duration<double>(early));
@@ -99,15 +119,21 @@ Result<Ingest> ingest(MapUpdater& map, const PointCloud& scan, int scans, double
     r.bytes += u.bytes;
   }
   r.points_per_second = double(points) / watch.seconds();
+  r.points_per_processor_second = double(points) / work.seconds();
+  r.peak_mb = megabytes("VmHWM:");
   return r;
 }
 
 void report_ingest(Report& report, const std::string& name, const Ingest& r, double reader, double solo) {
-  report.row({name, digits(r.points_per_second / 1e6), digits(1e3 * quantile(r.commits, 0.5)),
+  report.row({name, digits(r.points_per_second / 1e6), digits(r.points_per_processor_second / 1e6),
+              digits(r.peak_mb), digits(r.before_mb), digits(1e3 * quantile(r.commits, 0.5)),
               digits(1e3 * quantile(r.commits, 0.99)), digits(reader / 1e6),
               digits(solo > 0 ? reader / solo : 0)});
   report.json()["ingest"].push_back(Json{{"name", name},
                                          {"points_per_second", r.points_per_second},
+                                         {"points_per_processor_second", r.points_per_processor_second},
+                                         {"peak_mb", r.peak_mb},
+                                         {"before_mb", r.before_mb},
                                          {"commit_p50_s", quantile(r.commits, 0.5)},
                                          {"commit_p99_s", quantile(r.commits, 0.99)},
                                          {"points_added", r.added},
@@ -140,7 +166,10 @@ Status measure_ingest(const BenchSettings& settings, Report& report) {
   const double solo = read_on(report.scratch(), never, 5);
   report.line(
       fmt::format("\n## Scans of {} points into a map of {} million\n", scan.size(), size / 1'000'000));
-  report.table({"", "M points/s", "commit ms p50", "p99", "reader M points/s", "of alone"});
+  report.line(fmt::format("Budget of the updater: {} MB for what it knows of tiles, {} points in a batch.\n",
+                          update.cache_bytes >> 20, update.batch_points));
+  report.table({"", "M points/s", "per processor s", "peak MB", "MB before", "commit ms p50", "p99",
+                "reader M points/s", "of alone"});
   const int scans = settings.quick ? 30 : 150;
   update.density_cap = true;
   for (const bool with_reader : {false, true}) {

@@ -53,6 +53,7 @@ Eigen::Isometry3d pose_of_numbers(const std::vector<double>& v) {
 Result<Registration> run_method(const Arguments& a, const std::vector<Vec3>& scan, const LocalMapView& view) {
   const Eigen::Isometry3d guess = pose_of_numbers(a.guess);
   if (a.method == "gicp") return register_gicp(scan, view, guess, a.registration);
+  if (a.method == "ndt") return register_ndt(scan, view, guess, a.registration);
   return register_to_planes(scan, view, guess, a.method == "patches" ? Partner::patches : Partner::points,
                             a.registration);
 }
@@ -97,13 +98,15 @@ int main(int argc, char** argv) {
   app.add_option("MAP", a.map, "Map archive")->required();
   app.add_option("SCAN", a.scan, "Point file in the sensor's frame")->required();
   app.add_option("--guess", a.guess, "x y z [m] roll pitch yaw [degrees]: T_map_scan, about")->expected(6);
-  app.add_option("--method", a.method, "patches: stored surfaces, points: planes of points, gicp: PCL")
-      ->check(CLI::IsMember({"patches", "points", "gicp"}));
+  app.add_option("--method", a.method, "patches: stored surfaces, points: planes of points, gicp, ndt: PCL")
+      ->check(CLI::IsMember({"patches", "points", "gicp", "ndt"}));
   app.add_option("--radius", a.local.radius_m, "Of the local map [m]");
   app.add_option("--memory", a.memory_mb, "Budget of the local map [MB]");
   app.add_option("--reach", a.registration.reach_m, "Largest error of the guess, about [m]");
   app.add_option("--voxel", a.registration.scan_voxel_m,
                  "Thin the scan to one point per voxel of this side [m]");
+  app.add_option("--map-voxel", a.registration.map_voxel_m, "The same for the map")
+      ->check(CLI::PositiveNumber);
   app.add_option("--unit", a.unit_m, "Metres per unit of the scan");
   app.add_option("--threads", a.threads, "0: all cores")->check(CLI::Range(0, 1024));
   try {

@@ -3,7 +3,6 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
-#include <map>
 
 namespace mapcodec::examples {
 namespace {
@@ -13,15 +12,12 @@ using Eigen::Vector3d;
 using Matrix6d = Eigen::Matrix<double, 6, 6>;
 using Vector6d = Eigen::Matrix<double, 6, 1>;
 
-/// A plane is fitted to this many map points, and several patches are tried: the centre of the right one is
-/// not always the nearest.
-constexpr std::size_t kPlanePoints = 12, kPatches = 4;
-/// Beyond its rim a patch still counts for this share of its radius.
-constexpr double kRim = 0.25;
-/// A fitted plane must be this much wider than thick.
-constexpr double kFlat = 5;
 constexpr double kNarrowest = 0.01;  // [m] of the kernel
+/// Partners are never looked for nearer than this many voxels of the map: its means lie that far apart.
+constexpr double kNearest = 1.5;
 constexpr std::size_t kFewest = 20;
+/// Once steps are this short [in units of the smallest that counts], the reach shrinks to this share.
+constexpr double kSettled = 40, kNarrower = 0.6;
 
 Vector3d eigen(const Vec3& p) {
   return {p[0], p[1], p[2]};
@@ -34,40 +30,6 @@ struct Match {
   Vector3d point, normal;  // [map frame]
   double residual = 0;     // signed distance from the plane [m]
 };
-
-/// The plane through the map points around p; false if they are no plane.
-/// @param around_m  how far its points may be; @param reach_m  how far the plane.
-bool plane_of_points(const LocalMapView& map, const Vector3d& p, double around_m, double reach_m, Match& m) {
-  const auto near = map.nearest(plain(p), kPlanePoints, around_m);
-  if (near.size() < kPlanePoints / 2) return false;
-  Vector3d mean = Vector3d::Zero();
-  for (const auto& n : near) mean += eigen(map.point(n));
-  mean /= static_cast<double>(near.size());
-  Matrix3d covariance = Matrix3d::Zero();
-  for (const auto& n : near) {
-    const Vector3d d = eigen(map.point(n)) - mean;
-    covariance += d * d.transpose();
-  }
-  const Eigen::SelfAdjointEigenSolver<Matrix3d> axes(covariance);
-  if (!(axes.eigenvalues()[1] > kFlat * kFlat * axes.eigenvalues()[0])) return false;
-  m = {p, axes.eigenvectors().col(0), axes.eigenvectors().col(0).dot(p - mean)};
-  return std::abs(m.residual) <= reach_m;
-}
-
-/// The stored patch that p lies over with the least distance.
-bool plane_of_patches(const LocalMapView& map, const Vector3d& p, double around_m, double reach_m, Match& m) {
-  bool found = false;
-  for (const auto& n : map.nearest_patches(plain(p), kPatches, around_m)) {
-    const LocalMapView::Plane plane = map.plane(n);
-    const Vector3d normal = eigen(plane.normal), d = p - eigen(plane.center);
-    const double height = normal.dot(d), beside = (d - height * normal).norm();
-    if (beside > (1 + kRim) * double(plane.patch->radius_m) || std::abs(height) > reach_m) continue;
-    if (found && std::abs(height) >= std::abs(m.residual)) continue;
-    m = {p, normal, height};
-    found = true;
-  }
-  return found;
-}
 
 /// 1.48 x the median of the distances: a standard deviation that outliers do not move.
 double spread(const std::vector<Match>& matches) {
@@ -101,8 +63,7 @@ struct Normals {
 
 class PlaneIcp {
  public:
-  PlaneIcp(const LocalMapView& map, Partner partner, const RegistrationSettings& settings)
-      : map_(map), partner_(partner), settings_(settings) {}
+  PlaneIcp(const SurfelMap& map, const RegistrationSettings& settings) : map_(map), settings_(settings) {}
 
   Result<Registration> run(const std::vector<Vec3>& scan, const Eigen::Isometry3d& guess) {
     Registration r;
@@ -113,12 +74,12 @@ class PlaneIcp {
       const std::vector<Match> matches = match(scan, r.T_map_scan, reach);
       if (matches.size() < kFewest)
         return make_error(ErrorCode::kEmpty, "too few points of the scan meet the map");
-      const double sigma = spread(matches);
-      MAPCODEC_ASSIGN(const double moved, step(matches, std::max(kNarrowest, 3 * sigma), r));
-      // What lies far off by now has no partner.
-      const double next = std::clamp(6 * sigma, 0.1, reach);
+      // The kernel is as wide as the reach: what few points say about a direction counts until it fits.
+      MAPCODEC_ASSIGN(const double moved, step(matches, std::max(kNarrowest, 0.5 * reach), r));
+      const double least = std::min(reach, kNearest * settings_.map_voxel_m);
+      const double next = std::clamp(6 * spread(matches), least, reach);
       r.converged = moved < 1 && next > 0.95 * reach;
-      reach = std::max(next, 0.7 * reach);
+      if (moved < kSettled) reach = std::max(next, kNarrower * reach);
     }
     return r;
   }
@@ -127,11 +88,9 @@ class PlaneIcp {
   std::vector<Match> match(const std::vector<Vec3>& scan, const Eigen::Isometry3d& t, double reach) const {
     std::vector<Match> matches;
     for (const Vec3& p : scan) {
-      Match m;
       const Vector3d q = t * eigen(p);
-      if (partner_ == Partner::patches ? plane_of_patches(map_, q, 2 * settings_.reach_m, reach, m)
-                                       : plane_of_points(map_, q, settings_.reach_m, reach, m))
-        matches.push_back(m);
+      const Surfel* s = map_.nearest(q, reach);
+      if (s != nullptr) matches.push_back({q, s->normal, s->normal.dot(q - s->center)});
     }
     return matches;
   }
@@ -158,8 +117,7 @@ class PlaneIcp {
     return std::max(x.tail<3>().norm() / settings_.step_m, angle / settings_.step_rad);
   }
 
-  const LocalMapView& map_;
-  Partner partner_;
+  const SurfelMap& map_;
   const RegistrationSettings& settings_;
 };
 
@@ -170,28 +128,18 @@ Result<Registration> register_to_planes(const std::vector<Vec3>& scan, const Loc
                                         const RegistrationSettings& settings) {
   if (partner == Partner::patches && map.patches() == 0)
     return make_error(ErrorCode::kEmpty, "the map around the guess has no stored surfaces");
-  return PlaneIcp(map, partner, settings).run(thinned(scan, settings.scan_voxel_m), guess);
+  const SurfelMap surfels(
+      partner == Partner::patches ? points_on_patches(map, 0.5 * settings.map_voxel_m) : map.cloud().xyz,
+      settings.map_voxel_m);
+  return PlaneIcp(surfels, settings).run(thinned(scan, settings.scan_voxel_m), guess);
 }
 
-std::vector<Vec3> thinned(const std::vector<Vec3>& points, double voxel_m) {
-  if (!(voxel_m > 0)) return points;
-  struct Sum {
-    Vec3 sum{0, 0, 0};
-    double count = 0;
-  };
-  std::map<Vec3, std::size_t> index;
-  std::vector<Sum> sums;
-  for (const Vec3& p : points) {
-    const Vec3 cell{std::floor(p[0] / voxel_m), std::floor(p[1] / voxel_m), std::floor(p[2] / voxel_m)};
-    const auto [at, fresh] = index.try_emplace(cell, sums.size());
-    if (fresh) sums.emplace_back();
-    Sum& s = sums[at->second];
-    for (std::size_t d = 0; d < 3; ++d) s.sum[d] += p[d];
-    s.count += 1;
-  }
-  std::vector<Vec3> r;
-  for (const Sum& s : sums) r.push_back({s.sum[0] / s.count, s.sum[1] / s.count, s.sum[2] / s.count});
-  return r;
+Eigen::Isometry3d to_isometry(const MapPose& p) {
+  const auto& [x, y, z, w] = p.rotation_xyzw;
+  Eigen::Isometry3d t = Eigen::Isometry3d::Identity();
+  t.translate(eigen(p.translation_m));
+  t.rotate(Eigen::Quaterniond(w, x, y, z).normalized());
+  return t;
 }
 
 MapPose to_pose(const Eigen::Isometry3d& t) {

@@ -1,17 +1,19 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Where a scan was taken, from the map around: three ways, for `localize` and `mapcodec bench local`.
+// Where a scan was taken, from the map around: four ways, for `localize` and `mapcodec bench local`.
 #pragma once
 
 #include <Eigen/Geometry>
 #include <vector>
 
-#include "slam_adapter/local_map.hpp"
+#include "tools/examples/surfels.hpp"
 
 namespace mapcodec::examples {
 
 struct RegistrationSettings {
   double reach_m = 1.0;  ///< largest error of the guess, about: how far partners are looked for at first
   double scan_voxel_m = 0.10;  ///< the scan is thinned to one point per voxel of this side; 0: not at all
+  double map_voxel_m = 0.10;   ///< as the map is, to voxel means: > 0
+  double ndt_cell_m = 1.0;     ///< side of a normal distribution of NDT
   int iterations = 100;        ///< most of them
   double step_m = 5e-5;        ///< ends when a step moves the scan by less than this ...
   double step_rad = 1e-5;      ///< ... and turns it by less
@@ -28,8 +30,8 @@ struct Registration {
 
 /// What a point is matched with.
 enum class Partner {
-  patches,  ///< surfaces as stored (LocalContent::patches): no map point is decoded for it
-  points,   ///< planes through the map points around it (LocalContent::points)
+  patches,  ///< planes through stored surfaces (LocalContent::patches): no map point is decoded for it
+  points,   ///< planes through the map's points (LocalContent::points)
 };
 
 /// Point-to-plane ICP [Chen & Medioni 1992] by Gauss-Newton with a Geman-McClure kernel whose width follows
@@ -47,12 +49,15 @@ enum class Partner {
 [[nodiscard]] Result<Registration> register_gicp(const std::vector<Vec3>& scan, const LocalMapView& map,
                                                  const Eigen::Isometry3d& guess,
                                                  const RegistrationSettings& settings = {});
-/// Whether register_gicp was built.
-[[nodiscard]] bool has_gicp();
+/// PCL's normal distributions transform [Magnusson 2009; Biber & Strasser 2003] on the map's points.
+/// Errors: as register_gicp.
+[[nodiscard]] Result<Registration> register_ndt(const std::vector<Vec3>& scan, const LocalMapView& map,
+                                                const Eigen::Isometry3d& guess,
+                                                const RegistrationSettings& settings = {});
+/// Whether register_gicp and register_ndt were built.
+[[nodiscard]] bool has_pcl();
 
-/// The mean of the points in each voxel, in the order in which voxels were first met.
-[[nodiscard]] std::vector<Vec3> thinned(const std::vector<Vec3>& points, double voxel_m);
-
+[[nodiscard]] Eigen::Isometry3d to_isometry(const MapPose& p);
 [[nodiscard]] MapPose to_pose(const Eigen::Isometry3d& t);
 /// [mm] between the origins, [mrad] of the rotation between them.
 struct PoseDifference {

@@ -26,8 +26,11 @@ int run(Arguments& a) {
   a.settings.say = [](const std::string& text) { fmt::print(stderr, "{}\n", text); };
   a.settings.print = [](const std::string& text) { fmt::print("{}\n", text); };
   const Status s = a.what == "paper"     ? bench_paper(a.settings)
+                   : a.what == "formats" ? bench_formats(a.settings)
                    : a.what == "local"   ? bench_local(a.settings)
+                   : a.what == "octomap" ? bench_octomap(a.settings)
                    : a.what == "scaling" ? bench_scaling(a.settings)
+                   : a.what == "seams"   ? bench_seams(a.settings)
                    : a.what == "surface" ? bench_surface(a.settings)
                    : a.what == "update"  ? bench_update(a.settings)
                    : a.what == "service" ? bench_service(a.settings)
@@ -42,9 +45,11 @@ int run(Arguments& a) {
 void add_bench(CLI::App& app, Action& action) {
   auto a = std::make_shared<Arguments>();
   CLI::App* verb = app.add_subcommand("bench", "Measurements on a folder of clouds: JSON, tables and plots");
-  verb->add_option("WHAT", a->what, "local, paper, rate, scaling, service, surface or update")
+  verb->add_option("WHAT", a->what,
+                   "formats, local, octomap, paper, rate, scaling, seams, service, surface or update")
       ->required()
-      ->check(CLI::IsMember({"local", "paper", "rate", "scaling", "service", "surface", "update"}));
+      ->check(CLI::IsMember({"formats", "local", "octomap", "paper", "rate", "scaling", "seams", "service",
+                             "surface", "update"}));
   verb->add_option("--data", a->settings.data, "Folder that is searched for clouds")->required();
   verb->add_option("-o,--output", a->settings.report, "Folder for the report")->required();
   verb->add_option("--threads", a->settings.threads, "0: all cores")->check(CLI::Range(0, 1024));

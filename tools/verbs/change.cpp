@@ -21,6 +21,7 @@ Json change_json(const UpdateReport& r, const std::vector<std::string>& warnings
   j["tiles_new"] = r.tiles_new;
   j["tiles_removed"] = r.tiles_removed;
   j["tiles_folded"] = r.tiles_folded;
+  j["tiles_split"] = r.tiles_split;
   j["segment_bytes"] = r.bytes;
   j["seconds"] = seconds;
   j["points_per_second"] = seconds > 0 ? double(r.points_in) / seconds : 0;

@@ -6,6 +6,7 @@
 
 #include <memory>
 
+#include "tools/verbs/bag_flags.hpp"
 #include "tools/verbs/remote.hpp"
 #include "tools/verbs/report.hpp"
 #include "tools/verbs/verbs.hpp"
@@ -204,6 +205,7 @@ void add_compress(CLI::App& app, Action& action) {
   add_promise(*verb, *a);
   add_coding(*verb, *a);
   add_unit(*verb, a->options);
+  add_bag_flags(*verb, a->options.bag);
   add_paper_settings(*verb, a->options.paper);
   add_running(*verb, *a);
   verb->callback([a, &action] { action = [a] { return run(*a); }; });

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <memory>
 
+#include "tools/verbs/bag_flags.hpp"
 #include "tools/verbs/change.hpp"
 #include "tools/verbs/history.hpp"
 #include "tools/verbs/remote.hpp"
@@ -41,6 +42,7 @@ Status complete(Arguments& a) {
   o.color_error = r.color_error.value_or(o.color_error);
   o.tile_size_m = a.tile_size_m;
   o.unit_m = r.unit_m;
+  o.bag = r.bag;
   o.stop = stop_flag();
   r.create = o;
   return {};
@@ -91,6 +93,9 @@ void add_update(CLI::App& app, Action& action) {
   verb->add_option("--effort", a->effort, "Of the new segments until they are folded: fast, default, high")
       ->check(CLI::IsMember({"fast", "default", "high"}))
       ->capture_default_str();
+  verb->add_flag("--each-scan", a->request.each_scan,
+                 "ROS bags: each cloud becomes a submap TOPIC@STAMP with its pose, in the sensor's frame");
+  add_bag_flags(*verb, a->request.bag);
   verb->add_option("--unit", a->request.unit_m, "Metres per unit of the input")->check(CLI::PositiveNumber);
   verb->add_option("--threads", a->threads, "0: all cores")->check(CLI::Range(0, 1024));
   verb->add_flag("--json", a->json, "Summary as JSON on stdout");

@@ -29,6 +29,7 @@ void add_crop(CLI::App& app, Action& action);
 void add_pose(CLI::App& app, Action& action);
 void add_flatten(CLI::App& app, Action& action);
 void add_merge(CLI::App& app, Action& action);
+void add_rawlog(CLI::App& app, Action& action);
 void add_sync(CLI::App& app, Action& action);  // where the client of services is built
 
 }  // namespace mapcodec::cli

@@ -5,6 +5,7 @@
 
 #include <memory>
 
+#include "tools/verbs/bag_flags.hpp"
 #include "tools/verbs/report.hpp"
 #include "tools/verbs/verbs.hpp"
 
@@ -14,6 +15,7 @@ namespace {
 struct Arguments {
   std::string map;
   std::vector<std::string> originals;
+  BagOptions bag;
   bool json = false;
   int threads = 0;
   std::string progress = "auto";
@@ -36,8 +38,8 @@ int run(const Arguments& a) {
   settings.arena = &arena;
   settings.progress = progress_printer(a.progress);
   settings.stop = stop_flag();
-  const auto v =
-      a.originals.empty() ? verify_map(a.map, settings) : verify_map_against(a.map, a.originals, settings);
+  const auto v = a.originals.empty() ? verify_map(a.map, settings)
+                                     : verify_map_against(a.map, a.originals, settings, a.bag);
   settings.progress = {};
   if (!v.ok()) return fail(a.map, v.error());
   if (a.json) fmt::print("{}\n", outcome_json(*v).dump(2));
@@ -61,6 +63,7 @@ void add_verify(CLI::App& app, Action& action) {
       app.add_subcommand("verify", "Checksums and structure; with an original: the promise, measured");
   verb->add_option("MAP", a->map, "The archive")->required();
   verb->add_option("--against", a->originals, "The original file or files")->expected(1, -1);
+  add_bag_flags(*verb, a->bag);
   verb->add_flag("--json", a->json, "As JSON");
   verb->add_option("--threads", a->threads, "0: all cores")->check(CLI::Range(0, 1024));
   verb->add_option("--progress", a->progress, "auto, bar, plain, json or none, on stderr")

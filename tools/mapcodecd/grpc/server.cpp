@@ -11,6 +11,7 @@
 
 #include "tools/mapcodecd/config/listen_address.hpp"
 #include "tools/mapcodecd/grpc/map_calls.hpp"
+#include "tools/mapcodecd/http/listening_socket.hpp"
 
 namespace mapcodec::daemon {
 namespace {
@@ -94,13 +95,13 @@ Status GrpcServer::Impl::listen(grpc::ServerBuilder& builder) {
     MAPCODEC_ASSIGN(const ListenAddress address, parse_listen_address(text));
     MAPCODEC_TRY(check_listen(address, settings.tls.enabled(), settings.insecure));
     MAPCODEC_ASSIGN(const auto credentials, credentials_for(address, settings.tls));
-    if (is_socket(address)) ::unlink(address.path.c_str());
+    if (is_socket(address)) remove_stale_socket(address);
     asked.push_back(address);
   }
   ports.assign(asked.size(), 0);
   for (std::size_t i = 0; i < asked.size(); ++i) {
     const auto credentials = credentials_for(asked[i], settings.tls);
-    builder.AddListeningPort(settings.listen[i], credentials.value(), &ports[i]);
+    builder.AddListeningPort(asked[i].to_string(), credentials.value(), &ports[i]);
   }
   return {};
 }

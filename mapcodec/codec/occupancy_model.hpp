@@ -1,0 +1,130 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The adaptive state of an occupancy stream and its contexts (FORMAT.md 12). One template for both
+// directions, so that encoder and decoder cannot disagree. `Side` has
+//   bool bit(bool known, std::uint32_t p1)      codes `known` and returns it, or ignores it and decodes
+//   std::uint64_t raw(std::uint64_t known, int count)
+#pragma once
+
+#include <algorithm>
+
+#include "mapcodec/codec/occupancy_neighbors.hpp"
+#include "mapcodec/entropy/logistic_mixer.hpp"
+
+namespace mapcodec::occupancy {
+
+/// Binary contexts by hash. Those of one symbol lie side by side, so that a symbol costs one look into
+/// memory.
+class HashedModels {
+ public:
+  explicit HashedModels(unsigned bits) : models_(std::size_t{1} << bits), shift_(32 - bits) {}
+  /// A row of `size` (a power of two) models.
+  [[nodiscard]] BitModel* row(std::uint32_t key, std::uint32_t size) {
+    return &models_[(key * 0x2545F491u >> shift_) & ~(size - 1)];
+  }
+
+ private:
+  std::vector<BitModel> models_;
+  std::uint32_t shift_;
+};
+
+/// log2 of the number of models for a stream of so many symbols: more of them than symbols only cost time.
+[[nodiscard]] constexpr unsigned table_bits(std::uint64_t symbols, unsigned most) {
+  return std::clamp(static_cast<unsigned>(std::bit_width(symbols)), 8u, most);
+}
+
+/// Codes a bit with the mixture of three contexts and teaches all.
+template <class Side>
+bool code_mixed(Side& side, bool known, BitModel& a, BitModel& b, BitModel& c, LogisticMixer& mixer) {
+  const LogisticMixer::Mixed mixed = mixer.predict(a, b, c);
+  const bool bit = side.bit(known, mixed.probability);
+  mixer.update(mixed, bit);
+  a.update(bit);
+  b.update(bit);
+  c.update(bit);
+  return bit;
+}
+
+/// Which children nodes have.
+class StructureModel {
+ public:
+  explicit StructureModel(std::uint64_t inner_nodes)
+      : siblings_(table_bits(2 * inner_nodes, kMostBits)),
+        faces_(table_bits(2 * inner_nodes, kMostBits)),
+        around_(table_bits(2 * inner_nodes, kMostBits)) {}
+
+  /// Codes the eight cells of node `i` of `layer`, whose side is 2^height.
+  template <class Side>
+  std::uint16_t code(Side& shared, const Layer& layer, std::size_t i, unsigned height, std::uint32_t known) {
+    Side side = shared;  // in registers
+    const Outside out = look_around(layer, layer.beside[i]);
+    const std::uint32_t size = std::min(height, 4u) - 1;
+    std::uint32_t node = 0;
+    for (unsigned c = 0; c < 8; ++c) {
+      const Keys keys = keys_of(out, node, c, size);
+      const Rows rows{siblings_.row(keys.siblings, 4), faces_.row(keys.faces, 4),
+                      around_.row(keys.around, 4)};
+      LogisticMixer* const mixers = &mixers_[(size * 8 + c) * 3];
+      node |= code_cell(side, rows, mixers, height, known >> (2 * c) & 3) << (2 * c);
+    }
+    shared = side;
+    return static_cast<std::uint16_t>(node);
+  }
+
+ private:
+  static constexpr unsigned kMostBits = 16;
+
+  /// For each child (two bits at 2 c) the cell beyond the node's border along an axis, or along two.
+  struct Outside {
+    std::uint32_t x, y, z, xy, xz, yz;
+  };
+  struct Keys {
+    std::uint32_t siblings, faces, around;
+  };
+  struct Rows {
+    BitModel *a, *b, *c;
+  };
+
+  static Outside look_around(const Layer& layer, const Beside& beside) {
+    std::array<std::uint32_t, kBeside> w{};
+    for (std::size_t k = 0; k < kBeside; ++k) w[k] = layer.nodes[beside.index[k]];
+    Outside o{};
+    o.x = (w[0] >> 2 & 0x3333) | (w[1] << 2 & 0xCCCC);
+    o.y = (w[2] >> 4 & 0x0F0F) | (w[3] << 4 & 0xF0F0);
+    o.z = (w[4] >> 8 & 0x00FF) | (w[5] << 8 & 0xFF00);
+    o.xy = (w[6] >> 6 & 0x0303) | (w[7] >> 2 & 0x0C0C) | (w[8] << 2 & 0x3030) | (w[9] << 6 & 0xC0C0);
+    o.xz = (w[10] >> 10 & 0x0033) | (w[11] >> 6 & 0x00CC) | (w[12] << 6 & 0x3300) | (w[13] << 10 & 0xCC00);
+    o.yz = (w[14] >> 12 & 0x000F) | (w[15] >> 4 & 0x00F0) | (w[16] << 4 & 0x0F00) | (w[17] << 12 & 0xF000);
+    return o;
+  }
+
+  // A sibling that is not coded yet looks like an inner node (3), as neighbours do.
+  static Keys keys_of(const Outside& o, std::uint32_t node, unsigned c, std::uint32_t size) {
+    const unsigned s = 2 * c, sx = 2 * (c ^ 1), sy = 2 * (c ^ 2), sz = 2 * (c ^ 4);
+    const std::uint32_t faces = (o.x >> s & 3) | (o.y >> s & 3) << 2 | (o.z >> s & 3) << 4;
+    const std::uint32_t own = ((c & 1) != 0 ? node >> sx & 3 : 3) | ((c & 2) != 0 ? node >> sy & 3 : 3) << 2 |
+                              ((c & 4) != 0 ? node >> sz & 3 : 3) << 4;
+    const std::uint32_t edges = (o.x >> sy & 3) | (o.x >> sz & 3) << 2 | (o.y >> sx & 3) << 4 |
+                                (o.y >> sz & 3) << 6 | (o.z >> sx & 3) << 8 | (o.z >> sy & 3) << 10;
+    const std::uint32_t corners = (o.xy >> s & 3) | (o.xz >> s & 3) << 2 | (o.yz >> s & 3) << 4;
+    const std::uint32_t history = node | 1u << s;
+    Keys k{};
+    k.siblings = (history * 3 + size * 0x10001u) * 0x9E3779B1u ^ size * 0x7F4A7C15u;
+    k.faces = (history << 6 | faces) * 0x85EBCA6Bu ^ size * 0xC2B2AE35u;
+    k.around = ((faces | own << 6 | edges << 12 | corners << 24) * 0x9E3779B1u + corners * 0x27D4EB2Fu) ^
+               size * 0x165667B1u;
+    return k;
+  }
+
+  template <class Side>
+  static std::uint32_t code_cell(Side& side, const Rows& r, LogisticMixer* mixers, unsigned height,
+                                 std::uint32_t known) {
+    if (height > 1 && code_mixed(side, known == 3, r.a[0], r.b[0], r.c[0], mixers[0])) return 3;
+    if (code_mixed(side, known == 0, r.a[1], r.b[1], r.c[1], mixers[1])) return 0;
+    return code_mixed(side, known == 2, r.a[2], r.b[2], r.c[2], mixers[2]) ? 2 : 1;
+  }
+
+  HashedModels siblings_, faces_, around_;
+  std::array<LogisticMixer, 4 * 8 * 3> mixers_{};
+};
+
+}  // namespace mapcodec::occupancy
