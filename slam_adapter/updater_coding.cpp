@@ -137,7 +137,8 @@ Status UpdaterCoding::create(const std::string& path, const NewMap& map) {
   return {};
 }
 
-Result<std::unique_ptr<MapEditor>> UpdaterCoding::edit(const std::string& path, const std::atomic<bool>* stop) {
+Result<std::unique_ptr<MapEditor>> UpdaterCoding::edit(const std::string& path,
+                                                       const std::atomic<bool>* stop) {
   UpdateSettings settings = settings_;
   settings.stop = stop;
   MAPCODEC_ASSIGN(MapWriter writer, MapWriter::open(path));

@@ -10,7 +10,8 @@ namespace mapcodec {
 class UpdaterCoding final : public MapCoding {
  public:
   /// @param arena  must outlive this and all editors.
-  explicit UpdaterCoding(Arena& arena, const UpdateSettings& settings = {}) : arena_(arena), settings_(settings) {}
+  explicit UpdaterCoding(Arena& arena, const UpdateSettings& settings = {})
+      : arena_(arena), settings_(settings) {}
 
   /// Where there is a sample, everything is chosen for it as `create_map` does; else the lattice is that of
   /// the promise alone.

@@ -25,7 +25,8 @@ std::uint64_t live_bytes(const MapArchive& archive) {
   return bytes;
 }
 
-Compactor::Compactor(MapRegistry& registry, ServiceContext& context) : registry_(registry), context_(context) {
+Compactor::Compactor(MapRegistry& registry, ServiceContext& context)
+    : registry_(registry), context_(context) {
   thread_ = std::thread([this] { watch(); });
 }
 

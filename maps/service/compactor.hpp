@@ -10,8 +10,8 @@
 namespace mapcodec {
 
 /// Looks at the maps once a second. A map that nobody used for a while, and of whose file a large share is
-/// dead or whose tiles have segments to be folded, is compacted; a call to the map stops that, and it is tried
-/// again later.
+/// dead or whose tiles have segments to be folded, is compacted; a call to the map stops that, and it is
+/// tried again later.
 class Compactor {
  public:
   Compactor(MapRegistry& registry, ServiceContext& context);
@@ -19,7 +19,8 @@ class Compactor {
   /// Ends what is at work with Cancelled, for good.
   void stop();
 
-  /// Compacts now, through the map's queue. Waits. @param gives_way  a call to the map ends it with Cancelled.
+  /// Compacts now, through the map's queue. Waits. @param gives_way  a call to the map ends it with
+  /// Cancelled.
   [[nodiscard]] Result<CompactReport> compact(HostedMap& map, const CompactJob& job, bool gives_way);
 
  private:

@@ -8,10 +8,11 @@ namespace {
 
 // In the order of ErrorCode.
 constexpr std::array<std::string_view, 19> kNames{
-    "InvalidArgument", "NotFound",        "Unreadable",       "Empty",          "Truncated",
-    "Malformed",       "Unsupported",     "LimitExceeded",    "UnknownCodec",   "ChecksumMismatch",
-    "ArchiveDamaged",  "CannotWrite",     "PromiseBroken",    "Cancelled",      "Unreachable",
-    "Busy",            "Unauthenticated", "Denied",           "Exists"};
+    "InvalidArgument", "NotFound",         "Unreadable",     "Empty",
+    "Truncated",       "Malformed",        "Unsupported",    "LimitExceeded",
+    "UnknownCodec",    "ChecksumMismatch", "ArchiveDamaged", "CannotWrite",
+    "PromiseBroken",   "Cancelled",        "Unreachable",    "Busy",
+    "Unauthenticated", "Denied",           "Exists"};
 static_assert(kNames.size() == static_cast<std::size_t>(ErrorCode::kExists) + 1);
 
 }  // namespace

@@ -58,9 +58,10 @@ Status MapRegistry::scan_folder() {
 
 Result<HostedMapPtr> MapRegistry::find(const std::string& name) const {
   if (!is_map_name(name))
-    return make_error(ErrorCode::kInvalidArgument,
-                      "a map's name has 1 to 100 letters, digits, '-', '_' and '.', and begins with none of the "
-                      "last and no '-'");
+    return make_error(
+        ErrorCode::kInvalidArgument,
+        "a map's name has 1 to 100 letters, digits, '-', '_' and '.', and begins with none of the "
+        "last and no '-'");
   const std::shared_lock lock(mutex_);
   const auto at = maps_.find(name);
   if (at == maps_.end()) return make_error(ErrorCode::kNotFound, "there is no map '" + name + "'");

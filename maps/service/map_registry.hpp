@@ -13,7 +13,10 @@ namespace mapcodec {
 /// One map: readers, the writer, and those who watch.
 struct HostedMap {
   HostedMap(const std::string& map_name, const std::string& map_path, ServiceContext& context)
-      : name(map_name), path(map_path), reader(name, path, context), worker(path, reader, watchers, context) {}
+      : name(map_name),
+        path(map_path),
+        reader(name, path, context),
+        worker(path, reader, watchers, context) {}
 
   const std::string name, path;
   MapReader reader;
@@ -50,7 +53,8 @@ class MapRegistry {
   class Claim {
    public:
     Claim(MapRegistry& registry, std::string name) : registry_(&registry), name_(std::move(name)) {}
-    Claim(Claim&& other) noexcept : registry_(std::exchange(other.registry_, nullptr)), name_(std::move(other.name_)) {}
+    Claim(Claim&& other) noexcept
+        : registry_(std::exchange(other.registry_, nullptr)), name_(std::move(other.name_)) {}
     ~Claim();
     void keep();
 

@@ -14,7 +14,8 @@
 namespace mapcodec {
 
 struct MapService::Impl {
-  Impl(const ServiceSettings& s, MapCoding& c, MapCatalogue& k, ServiceMetrics& m) : context(s, c, k, m), maps(context) {}
+  Impl(const ServiceSettings& s, MapCoding& c, MapCatalogue& k, ServiceMetrics& m)
+      : context(s, c, k, m), maps(context) {}
 
   [[nodiscard]] Result<HostedMapPtr> use(const std::string& name) const {
     MAPCODEC_ASSIGN(HostedMapPtr map, maps.find(name));
@@ -95,9 +96,12 @@ Status check_whole(const MapArchive& archive, const MapCoding& coding) {
       segments.push_back(std::move(bytes));
     }
     const auto cloud = coding.decode({segments.begin(), segments.end()}, *schema, std::nullopt, {});
-    if (!cloud.ok()) return make_error(ErrorCode::kArchiveDamaged, "tile " + tile_name(t) + ": " + cloud.error().to_string());
+    if (!cloud.ok())
+      return make_error(ErrorCode::kArchiveDamaged,
+                        "tile " + tile_name(t) + ": " + cloud.error().to_string());
     if (cloud->size() != t.points)
-      return make_error(ErrorCode::kArchiveDamaged, "tile " + tile_name(t) + " does not have the points that it claims");
+      return make_error(ErrorCode::kArchiveDamaged,
+                        "tile " + tile_name(t) + " does not have the points that it claims");
   }
   return {};
 }
@@ -176,7 +180,8 @@ Status MapService::insert(const std::string& name, Scan scan,
 }
 
 std::uint64_t MapService::retry_after_ms() const {
-  const double seconds = double(impl_->context.queued_points) / std::max(1e4, impl_->context.points_per_second.load());
+  const double seconds =
+      double(impl_->context.queued_points) / std::max(1e4, impl_->context.points_per_second.load());
   return static_cast<std::uint64_t>(std::clamp(500 * seconds, 50.0, 5000.0));
 }
 
@@ -224,8 +229,10 @@ Result<std::uint64_t> MapService::set_poses(const std::string& name, std::vector
     std::vector<PoseChange> changes;
     const std::vector<Submap>& submaps = editor.info().submaps;
     for (const NamedPose& p : poses) {
-      const auto at = std::find_if(submaps.begin(), submaps.end(), [&](const Submap& s) { return s.name == p.submap; });
-      if (at == submaps.end()) return make_error(ErrorCode::kNotFound, "no submap is called '" + p.submap + "'");
+      const auto at =
+          std::find_if(submaps.begin(), submaps.end(), [&](const Submap& s) { return s.name == p.submap; });
+      if (at == submaps.end())
+        return make_error(ErrorCode::kNotFound, "no submap is called '" + p.submap + "'");
       changes.push_back(p.pose);
       changes.back().submap = static_cast<std::uint32_t>(at - submaps.begin());
     }
@@ -239,8 +246,10 @@ Result<std::uint64_t> MapService::erase(const std::string& name, std::optional<E
     std::optional<std::uint32_t> number;
     if (submap) {
       const std::vector<Submap>& submaps = editor.info().submaps;
-      const auto at = std::find_if(submaps.begin(), submaps.end(), [&](const Submap& s) { return s.name == *submap; });
-      if (at == submaps.end()) return make_error(ErrorCode::kNotFound, "no submap is called '" + *submap + "'");
+      const auto at =
+          std::find_if(submaps.begin(), submaps.end(), [&](const Submap& s) { return s.name == *submap; });
+      if (at == submaps.end())
+        return make_error(ErrorCode::kNotFound, "no submap is called '" + *submap + "'");
       number = static_cast<std::uint32_t>(at - submaps.begin());
     }
     return editor.erase(erasure, number);

@@ -19,17 +19,17 @@
 namespace mapcodec {
 
 struct ServiceSettings {
-  std::string folder;                                     ///< of the archives NAME.mapc; must exist
-  std::uint64_t cache_bytes = std::uint64_t{256} << 20;   ///< of segments that were read
-  std::uint64_t queue_points = std::uint64_t{8} << 20;    ///< that wait for a commit, over all maps
-  std::uint64_t commit_points = std::uint64_t{1} << 20;   ///< a commit takes about so many at most
-  double commit_after_s = 0.02;                           ///< scans wait so long for others to share a commit
+  std::string folder;                                    ///< of the archives NAME.mapc; must exist
+  std::uint64_t cache_bytes = std::uint64_t{256} << 20;  ///< of segments that were read
+  std::uint64_t queue_points = std::uint64_t{8} << 20;   ///< that wait for a commit, over all maps
+  std::uint64_t commit_points = std::uint64_t{1} << 20;  ///< a commit takes about so many at most
+  double commit_after_s = 0.02;                          ///< scans wait so long for others to share a commit
   std::size_t max_maps = 10000;
-  std::size_t max_editors = 64;                           ///< maps that are written to at the same time
-  double editor_idle_s = 60;                              ///< then its memory and its lock are given back
-  double compact_idle_s = 30;                             ///< no traffic for so long before a map is compacted; 0: never
-  double compact_dead_share = 0.5;                        ///< of the file that no kept revision needs
-  std::uint64_t max_scan_points = std::uint64_t{1} << 22; ///< in one scan
+  std::size_t max_editors = 64;     ///< maps that are written to at the same time
+  double editor_idle_s = 60;        ///< then its memory and its lock are given back
+  double compact_idle_s = 30;       ///< no traffic for so long before a map is compacted; 0: never
+  double compact_dead_share = 0.5;  ///< of the file that no kept revision needs
+  std::uint64_t max_scan_points = std::uint64_t{1} << 22;  ///< in one scan
 };
 
 /// A map at one revision, for as long as somebody holds it.
@@ -50,12 +50,14 @@ struct MapEntry {
 
 /// One scan on its way into a map.
 struct Scan {
-  PointCloud points;                 ///< [m, frame of the scan]
-  std::string submap;                ///< empty: the map's own points
+  PointCloud points;                        ///< [m, frame of the scan]
+  std::string submap;                       ///< empty: the map's own points
   std::optional<PoseChange> T_submap_scan;  ///< where the scan was taken; its `submap` is not used
   std::optional<PoseChange> T_map_submap;   ///< where the submap lies from now on
-  std::string writer;                ///< who sends it; with a sequence number a scan that comes twice counts once
-  std::uint64_t sequence = 0;        ///< ascending per writer, from 1; 0: none
+  std::string writer;          ///< who sends it; with a sequence number a scan that comes twice counts once
+  std::uint64_t sequence = 0;  ///< per writer, from 1, without gaps; 0: none
+  std::uint64_t acknowledged =
+      0;  ///< of this writer, as it says itself: a scan that added nothing leaves no trace
 };
 
 /// After the commit that made a scan durable.
@@ -167,7 +169,8 @@ class MapService {
   /// Calls `changed` from a thread of the service whenever the map has a new revision or goes away, until
   /// the watcher (watch_list.hpp) is destroyed. `changed` must neither wait nor destroy a watcher.
   class Watcher;
-  [[nodiscard]] Result<std::unique_ptr<Watcher>> watch(const std::string& name, std::function<void()> changed);
+  [[nodiscard]] Result<std::unique_ptr<Watcher>> watch(const std::string& name,
+                                                       std::function<void()> changed);
 
   [[nodiscard]] Result<MapStats> stats(const std::string& name) const;
   [[nodiscard]] ServiceStats stats() const;

@@ -132,7 +132,7 @@ std::vector<MapWorker::QueuedScan> MapWorker::take_scans() {
 Result<ScanReceipt> MapWorker::put_scan(MapEditor& editor, QueuedScan& queued) {
   Scan& scan = queued.scan;
   if (!scan.writer.empty() && scan.sequence > 0) {
-    const std::uint64_t last = desk_.writers().last(scan.writer);
+    const std::uint64_t last = std::max(desk_.writers().last(scan.writer), scan.acknowledged);
     if (scan.sequence <= last) return ScanReceipt{0, true};
     if (scan.sequence != last + 1)
       return make_error(ErrorCode::kInvalidArgument,
@@ -184,7 +184,8 @@ void MapWorker::commit(std::vector<QueuedScan> batch) {
     context_.metrics.add(Counter::points_in, double(points));
     context_.metrics.add(Counter::scans_in, double(batch.size()));
     context_.metrics.commit(took, batch.size());
-    if (points > 0) context_.points_per_second = 0.8 * context_.points_per_second + 0.2 * double(points) / took;
+    if (points > 0)
+      context_.points_per_second = 0.8 * context_.points_per_second + 0.2 * double(points) / took;
   }
   for (std::size_t i = 0; i < batch.size(); ++i) batch[i].done(results[i]);
   waiting_ -= batch.size();

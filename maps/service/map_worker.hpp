@@ -42,8 +42,8 @@ class EditingDesk {
   std::atomic<bool> open_{false};
 };
 
-/// Threads: from many at once. The thread ends, and the archive's lock is given back, when there was nothing to
-/// do for a while.
+/// Threads: from many at once. The thread ends, and the archive's lock is given back, when there was nothing
+/// to do for a while.
 class MapWorker {
  public:
   using Done = std::function<void(const Result<ScanReceipt>&)>;

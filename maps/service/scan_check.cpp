@@ -52,7 +52,8 @@ std::array<std::int64_t, 3> cell_of(const Vec3& p, const MapSchema& schema) {
 
 Status check_spread(const PointCloud& points, const Box& box, const MapSchema& schema) {
   for (std::size_t d = 0; d < 3; ++d) {
-    const double reach = std::max(std::abs(box.min[d] - schema.origin[d]), std::abs(box.max[d] - schema.origin[d]));
+    const double reach =
+        std::max(std::abs(box.min[d] - schema.origin[d]), std::abs(box.max[d] - schema.origin[d]));
     if (!(reach < schema.tile_size_m * double(std::uint32_t{1} << 30)))
       return bad("a point lies too far from the map's origin");
   }

@@ -51,8 +51,10 @@ std::vector<std::size_t> of_sphere(const MapArchive& archive, const TileSelectio
 }  // namespace
 
 Result<std::vector<std::size_t>> MapService::select(const MapView& view, const TileSelection& selection) {
-  const bool several = (!selection.keys.empty()) + selection.box.has_value() + selection.sphere.has_value() > 1;
-  if (several) return make_error(ErrorCode::kInvalidArgument, "ask by keys, by a box or by a sphere: one of them");
+  const bool several =
+      (!selection.keys.empty()) + selection.box.has_value() + selection.sphere.has_value() > 1;
+  if (several)
+    return make_error(ErrorCode::kInvalidArgument, "ask by keys, by a box or by a sphere: one of them");
   if (!selection.keys.empty()) return of_keys(*view.archive, selection.keys);
   if (selection.box) {
     for (std::size_t d = 0; d < 3; ++d) {

@@ -154,7 +154,8 @@ void write(const Box& box, v1::Box& out) {
 Result<TileSelection::Key> read(const v1::TileKey& key) {
   if (key.level() > kMaxTileLevel && key.level() != TileKey::kUnplacedLevel)
     return malformed("a tile has no level " + std::to_string(key.level()));
-  return TileSelection::Key{key.submap(), {key.x(), key.y(), key.z(), static_cast<std::uint8_t>(key.level())}};
+  return TileSelection::Key{key.submap(),
+                            {key.x(), key.y(), key.z(), static_cast<std::uint8_t>(key.level())}};
 }
 void write(std::uint32_t submap, const TileKey& key, v1::TileKey& out) {
   out.set_x(key.x);
@@ -221,7 +222,8 @@ Result<MapInfo> read(const v1::MapFacts& facts) {
   info.flags = facts.flags();
   for (const v1::Submap& s : facts.submaps()) {
     MAPCODEC_ASSIGN(const PoseChange pose, read(s.t_map_submap()));
-    info.submaps.push_back({s.name(), pose.translation_m, pose.rotation_xyzw, s.first_stamp(), s.last_stamp()});
+    info.submaps.push_back(
+        {s.name(), pose.translation_m, pose.rotation_xyzw, s.first_stamp(), s.last_stamp()});
   }
   for (const v1::NamedRevision& s : facts.snapshots()) info.snapshots.push_back({s.name(), s.revision()});
   for (const auto& [name, value] : facts.extras()) info.extras[name].assign(value.begin(), value.end());

@@ -14,8 +14,8 @@ using Stub = v1::MapService::Stub;
 /// One call with one answer.
 template <class Request, class Reply>
 Status call(const MapClient::Connection& c, double timeout_s,
-            grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&, Reply*), const Request& request,
-            Reply& reply) {
+            grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&, Reply*),
+            const Request& request, Reply& reply) {
   grpc::ClientContext context;
   c.prepare(context, timeout_s);
   const grpc::Status s = (c.stub.get()->*method)(&context, request, &reply);
@@ -24,7 +24,8 @@ Status call(const MapClient::Connection& c, double timeout_s,
 
 template <class Request>
 Result<std::uint64_t> change(const MapClient::Connection& c,
-                             grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&, v1::RevisionReply*),
+                             grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&,
+                                                          v1::RevisionReply*),
                              Request request) {
   request.set_map(c.url.map);
   v1::RevisionReply reply;

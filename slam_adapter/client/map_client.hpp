@@ -24,13 +24,14 @@
 namespace mapcodec {
 
 struct ClientSettings {
-  std::string token;           ///< sent as "authorization: Bearer"; empty: none
-  std::string ca_file;         ///< PEM; given: TLS, and the server's certificate must be signed by it
+  std::string token;    ///< sent as "authorization: Bearer"; empty: none
+  std::string ca_file;  ///< PEM; given: TLS, and the server's certificate must be signed by it
   std::string certificate_file, key_file;  ///< PEM, for servers that ask clients for one
-  double timeout_s = 30;       ///< of calls that are no streams, and for the connection
-  double job_timeout_s = 3600; ///< of calls that rewrite the map
+  double timeout_s = 30;                   ///< of calls that are no streams, and for the connection
+  double job_timeout_s = 3600;             ///< of calls that rewrite the map
 
-  /// From MAPCODEC_TOKEN, MAPCODEC_CA, MAPCODEC_CERTIFICATE, MAPCODEC_KEY, MAPCODEC_TIMEOUT where they are set.
+  /// From MAPCODEC_TOKEN, MAPCODEC_CA, MAPCODEC_CERTIFICATE, MAPCODEC_KEY, MAPCODEC_TIMEOUT where they are
+  /// set.
   [[nodiscard]] static ClientSettings from_environment();
 };
 
@@ -43,11 +44,11 @@ struct RemoteFacts {
 
 /// A tile on its way.
 struct RemoteTile {
-  TileRecord record;        ///< segments have lengths and checksums; their offsets mean nothing
-  ContentHash hash;         ///< of the content
+  TileRecord record;  ///< segments have lengths and checksums; their offsets mean nothing
+  ContentHash hash;   ///< of the content
   bool not_modified = false;
-  std::vector<Bytes> segments;     ///< one for each of record.segments, checked
-  std::vector<bool> sent;          ///< false: the client said that it has the segment; then its bytes are empty
+  std::vector<Bytes> segments;  ///< one for each of record.segments, checked
+  std::vector<bool> sent;       ///< false: the client said that it has the segment; then its bytes are empty
   std::optional<unsigned> coarse;  ///< only the leading bytes, for this level of detail
 };
 
@@ -62,7 +63,7 @@ struct TileRequest {
 
 /// What a watcher is told: the way from what it has to a revision.
 struct RemoteChanges {
-  bool reset = false;  ///< `changes` are all tiles that there are
+  bool reset = false;               ///< `changes` are all tiles that there are
   std::vector<TileChange> changes;  ///< `tile` is not set
   RemoteFacts facts;
 };
@@ -72,7 +73,8 @@ struct RemoteChanges {
 class MapClient {
  public:
   /// Connects when it is first needed. Errors: InvalidArgument (url), NotFound, Malformed (certificates).
-  [[nodiscard]] static Result<MapClient> connect(const std::string& url, const ClientSettings& settings = ClientSettings::from_environment());
+  [[nodiscard]] static Result<MapClient> connect(
+      const std::string& url, const ClientSettings& settings = ClientSettings::from_environment());
   MapClient(MapClient&&) noexcept;
   MapClient& operator=(MapClient&&) noexcept;
   ~MapClient();
@@ -88,12 +90,14 @@ class MapClient {
   [[nodiscard]] Status tiles(const TileRequest& request, RemoteFacts* facts,
                              const std::function<Status(RemoteTile&&)>& sink) const;
   /// @param since  0: from nothing. @param once  ends with the newest revision.
-  /// @param sink  is given each step; false ends the call. @param stop  becomes true: ends soon; may be nullptr.
+  /// @param sink  is given each step; false ends the call. @param stop  becomes true: ends soon; may be
+  /// nullptr.
   [[nodiscard]] Status watch(std::uint64_t since, bool once, const std::atomic<bool>* stop,
                              const std::function<Result<bool>(RemoteChanges&&)>& sink) const;
 
   [[nodiscard]] Result<std::uint64_t> set_poses(const std::vector<MapService::NamedPose>& poses) const;
-  [[nodiscard]] Result<std::uint64_t> erase(const std::optional<Erasure>& e, const std::optional<std::string>& submap) const;
+  [[nodiscard]] Result<std::uint64_t> erase(const std::optional<Erasure>& e,
+                                            const std::optional<std::string>& submap) const;
   [[nodiscard]] Result<std::uint64_t> snapshot(const std::string& name, bool remove = false) const;
   [[nodiscard]] Result<std::uint64_t> rollback(const std::string& revision) const;
   [[nodiscard]] Result<CompactReport> compact(std::uint64_t keep_last = 0) const;

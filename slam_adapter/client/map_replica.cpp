@@ -67,7 +67,8 @@ Status MapReplica::put(const RemoteTile& tile, ReplicaReport& report) {
   const auto bytes_at = [&](std::size_t i) -> Result<Bytes> {
     if (tile.sent[i]) return tile.segments[i];
     const auto here = i < r.hashes.size() ? segments_.find(r.hashes[i]) : segments_.end();
-    if (here == segments_.end()) return make_error(ErrorCode::kMalformed, "the server left out an unknown segment");
+    if (here == segments_.end())
+      return make_error(ErrorCode::kMalformed, "the server left out an unknown segment");
     return writer_->read(here->second);
   };
   std::vector<Bytes> all;
@@ -143,8 +144,9 @@ Result<ReplicaReport> MapReplica::apply(RemoteChanges&& step) {
   const std::uint64_t revision = report.revision = step.facts.revision;
   if (writer_ && revision == writer_->revision()) return report;
   if (writer_ && revision < writer_->revision())
-    return make_error(ErrorCode::kExists, path_ + ": the copy has revision " + std::to_string(writer_->revision()) +
-                                              ", and the server only " + std::to_string(revision));
+    return make_error(ErrorCode::kExists, path_ + ": the copy has revision " +
+                                              std::to_string(writer_->revision()) + ", and the server only " +
+                                              std::to_string(revision));
   MAPCODEC_TRY(begin(step.facts));
   MAPCODEC_ASSIGN(const Keys wanted, drop_and_list(step, report));
   for (std::size_t i = 0; i < wanted.size(); i += kAtOnce) {
@@ -166,11 +168,13 @@ Result<ReplicaReport> MapReplica::catch_up() {
   return report;
 }
 
-Status MapReplica::follow(const std::atomic<bool>* stop, const std::function<bool(const ReplicaReport&)>& told) {
-  return client_->watch(writer_ ? writer_->revision() : 0, false, stop, [&](RemoteChanges&& step) -> Result<bool> {
-    MAPCODEC_ASSIGN(const ReplicaReport report, apply(std::move(step)));
-    return told(report);
-  });
+Status MapReplica::follow(const std::atomic<bool>* stop,
+                          const std::function<bool(const ReplicaReport&)>& told) {
+  return client_->watch(writer_ ? writer_->revision() : 0, false, stop,
+                        [&](RemoteChanges&& step) -> Result<bool> {
+                          MAPCODEC_ASSIGN(const ReplicaReport report, apply(std::move(step)));
+                          return told(report);
+                        });
 }
 
 Result<ReplicaReport> MapReplica::fetch_around(const Vec3& centre, double radius_m) {

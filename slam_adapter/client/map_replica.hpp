@@ -10,10 +10,10 @@
 namespace mapcodec {
 
 struct ReplicaReport {
-  std::uint64_t revision = 0;         ///< that the copy has now
+  std::uint64_t revision = 0;  ///< that the copy has now
   std::uint64_t tiles_fetched = 0, tiles_removed = 0;
-  std::uint64_t bytes_fetched = 0;    ///< of segments
-  std::uint64_t bytes_whole = 0;      ///< of all segments of the map
+  std::uint64_t bytes_fetched = 0;  ///< of segments
+  std::uint64_t bytes_whole = 0;    ///< of all segments of the map
 };
 
 /// The archive has the server's facts, revisions by their numbers, and tiles bit for bit. Threads: one.
@@ -26,9 +26,10 @@ class MapReplica {
   /// Fetches the whole map as it is now. Errors: as MapClient, MapWriter.
   [[nodiscard]] Result<ReplicaReport> catch_up();
   /// Goes on as the map changes, until `stop` or an error. @param told  after each step; false ends it.
-  [[nodiscard]] Status follow(const std::atomic<bool>* stop, const std::function<bool(const ReplicaReport&)>& told);
-  /// Fetches the tiles around a place [m, map frame] only, and forgets others of them that are gone. A copy by
-  /// pieces: its revisions are its own. @return nothing fetched and nothing changed: `revision` 0.
+  [[nodiscard]] Status follow(const std::atomic<bool>* stop,
+                              const std::function<bool(const ReplicaReport&)>& told);
+  /// Fetches the tiles around a place [m, map frame] only, and forgets others of them that are gone. A copy
+  /// by pieces: its revisions are its own. @return nothing fetched and nothing changed: `revision` 0.
   [[nodiscard]] Result<ReplicaReport> fetch_around(const Vec3& centre, double radius_m);
 
   [[nodiscard]] const std::string& path() const { return path_; }

@@ -10,7 +10,8 @@ bool is_map_url(const std::string& text) {
 }
 
 Result<MapUrl> parse_map_url(const std::string& text) {
-  const std::string rest = is_map_url(text) ? text.substr(std::string_view(kMapScheme).size()) : std::string();
+  const std::string rest =
+      is_map_url(text) ? text.substr(std::string_view(kMapScheme).size()) : std::string();
   const bool socket = rest.rfind("unix:/", 0) == 0;
   const auto slash = socket ? rest.rfind('/') : rest.find('/');
   MapUrl url;

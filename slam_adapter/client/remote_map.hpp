@@ -9,8 +9,8 @@ namespace mapcodec {
 
 struct RemoteMapSettings {
   LocalMapSettings local;
-  std::string cache_file;  ///< archive of the tiles that were fetched; stays for the next time
-  double look_every_s = 1; ///< how often the server is asked what changed near the robot
+  std::string cache_file;   ///< archive of the tiles that were fetched; stays for the next time
+  double look_every_s = 1;  ///< how often the server is asked what changed near the robot
 };
 
 struct RemoteMapState {
@@ -26,7 +26,8 @@ class RemoteMap {
  public:
   /// Begins with the cache where there is one; else waits for the server.
   /// @param arena  must outlive the map. Errors: as MapClient (without a cache), LocalMap::over.
-  [[nodiscard]] static Result<std::unique_ptr<RemoteMap>> open(const std::string& url, const RemoteMapSettings& settings,
+  [[nodiscard]] static Result<std::unique_ptr<RemoteMap>> open(const std::string& url,
+                                                               const RemoteMapSettings& settings,
                                                                Arena& arena);
   ~RemoteMap();
   RemoteMap(const RemoteMap&) = delete;

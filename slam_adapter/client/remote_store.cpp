@@ -40,7 +40,8 @@ class RemoteStore final : public TileStore {
     while (length > 0) {
       MAPCODEC_ASSIGN(const auto block, block_of(offset / kBlock));
       const std::uint64_t in = offset % kBlock, take = std::min<std::uint64_t>(length, block->size() - in);
-      bytes.insert(bytes.end(), block->begin() + std::ptrdiff_t(in), block->begin() + std::ptrdiff_t(in + take));
+      bytes.insert(bytes.end(), block->begin() + std::ptrdiff_t(in),
+                   block->begin() + std::ptrdiff_t(in + take));
       offset += take;
       length -= take;
     }
@@ -88,7 +89,8 @@ class RemoteStore final : public TileStore {
       bytes.insert(bytes.end(), reply.data().begin(), reply.data().end());
     }
     MAPCODEC_TRY(status_of(context, reader->Finish(), connection_->url));
-    if (bytes.size() != length) return make_error(ErrorCode::kTruncated, "the server sent less than was asked for");
+    if (bytes.size() != length)
+      return make_error(ErrorCode::kTruncated, "the server sent less than was asked for");
     bytes_read_ += bytes.size();
     return bytes;
   }

@@ -92,11 +92,13 @@ Status ScanSender::Impl::connect_once() {
   v1::InsertRequest open;
   open.mutable_open()->set_map(connection->url.map);
   open.mutable_open()->set_writer(settings.writer);
+  if (!settings.writer.empty()) open.mutable_open()->set_acknowledged(acknowledged);
   v1::InsertReply reply;
   if (!stream->Write(open) || !stream->Read(&reply)) {
     const grpc::Status s = stream->Finish();
     stream = nullptr;
-    return s.ok() ? Status(make_error(ErrorCode::kUnreachable, "the server ended the stream")) : status_of(*context, s, connection->url);
+    return s.ok() ? Status(make_error(ErrorCode::kUnreachable, "the server ended the stream"))
+                  : status_of(*context, s, connection->url);
   }
   if (!settings.writer.empty()) acknowledge(reply.sequence());
   if (pending.empty() && !settings.writer.empty()) next = std::max(next, reply.sequence() + 1);
@@ -114,7 +116,8 @@ Status ScanSender::Impl::resend() {
 
 Status ScanSender::Impl::connect() {
   const auto give_up = std::chrono::steady_clock::now() + std::chrono::duration<double>(settings.retry_s);
-  for (auto pause = std::chrono::milliseconds(20);; pause = std::min(2 * pause, std::chrono::milliseconds(1000))) {
+  for (auto pause = std::chrono::milliseconds(20);;
+       pause = std::min(2 * pause, std::chrono::milliseconds(1000))) {
     const Status s = connect_once();
     if (s.ok() || !may_pass(s.error().code) || std::chrono::steady_clock::now() > give_up) return s;
     std::this_thread::sleep_for(pause);
@@ -146,7 +149,8 @@ Status ScanSender::Impl::wait(std::unique_lock<std::mutex>& lock, const std::fun
     Status s = why_ended();
     const bool again = may_pass(s.error().code) && std::chrono::steady_clock::now() < give_up;
     if (again) {
-      if (s.error().code != ErrorCode::kUnreachable) std::this_thread::sleep_for(std::chrono::milliseconds(200));
+      if (s.error().code != ErrorCode::kUnreachable)
+        std::this_thread::sleep_for(std::chrono::milliseconds(200));
       s = connect();
       ++reconnects;
     }
@@ -162,7 +166,8 @@ Status ScanSender::Impl::wait(std::unique_lock<std::mutex>& lock, const std::fun
 Status ScanSender::Impl::send(Piece piece) {
   std::unique_lock lock(mutex);
   MAPCODEC_TRY(failed);
-  MAPCODEC_TRY(wait(lock, [&] { return pending_points == 0 || pending_points + piece.points <= settings.window_points; }));
+  MAPCODEC_TRY(wait(
+      lock, [&] { return pending_points == 0 || pending_points + piece.points <= settings.window_points; }));
   piece.sequence = next++;
   piece.message.mutable_scan()->set_sequence(piece.sequence);
   pending_points += piece.points;
@@ -179,7 +184,8 @@ ScanSender::~ScanSender() {
   impl_->disconnect();
 }
 
-Result<std::unique_ptr<ScanSender>> ScanSender::open(const MapClient& client, const SenderSettings& settings) {
+Result<std::unique_ptr<ScanSender>> ScanSender::open(const MapClient& client,
+                                                     const SenderSettings& settings) {
   auto impl = std::make_unique<Impl>(client, settings);
   if (const Status s = impl->connect(); !s.ok()) return s.error();
   return std::unique_ptr<ScanSender>(new ScanSender(std::move(impl)));

@@ -10,15 +10,17 @@ struct SenderSettings {
   /// Scans of one writer are numbered, across connections and programs: the service knows which it has.
   /// Empty: scans that were on their way when a connection broke may be stored twice.
   std::string writer;
-  std::uint64_t window_points = std::uint64_t{1} << 20;  ///< sent and not acknowledged; `send` waits beyond it
-  double retry_s = 60;  ///< how long an unreachable or busy server is tried again
+  std::uint64_t window_points = std::uint64_t{1}
+                                << 20;  ///< sent and not acknowledged; `send` waits beyond it
+  double retry_s = 60;                  ///< how long an unreachable or busy server is tried again
 };
 
 /// Threads: one sends.
 class ScanSender {
  public:
   /// Errors: as MapClient; InvalidArgument (writer's name).
-  [[nodiscard]] static Result<std::unique_ptr<ScanSender>> open(const MapClient& client, const SenderSettings& settings);
+  [[nodiscard]] static Result<std::unique_ptr<ScanSender>> open(const MapClient& client,
+                                                                const SenderSettings& settings);
   /// Waits for nothing; what was not acknowledged may be lost.
   ~ScanSender();
   ScanSender(const ScanSender&) = delete;

@@ -58,7 +58,8 @@ class TileAssembly {
       const Bytes& bytes = tile_.segments[i];
       if (bytes.empty() || tile_.coarse) continue;
       if (crc32c(bytes) != tile_.record.segments[i].crc)
-        return make_error(ErrorCode::kChecksumMismatch, "tile " + tile_name(tile_.record) + " was changed on its way");
+        return make_error(ErrorCode::kChecksumMismatch,
+                          "tile " + tile_name(tile_.record) + " was changed on its way");
     }
     return sink_(std::move(tile_));
   }
@@ -85,9 +86,11 @@ class TileAssembly {
     const auto malformed = [](const char* what) { return make_error(ErrorCode::kMalformed, what); };
     const int count = t.segment_bytes_size();
     if (!tile_.coarse && t.segment_crc_size() != count) return malformed("segments without checksums");
-    if (t.segment_sent_size() != 0 && t.segment_sent_size() != count) return malformed("segments do not match");
+    if (t.segment_sent_size() != 0 && t.segment_sent_size() != count)
+      return malformed("segments do not match");
     for (int i = 0; i < count; ++i) {
-      if (t.segment_bytes(i) == 0 || t.segment_bytes(i) > kMaxSegmentBytes) return malformed("a segment's size");
+      if (t.segment_bytes(i) == 0 || t.segment_bytes(i) > kMaxSegmentBytes)
+        return malformed("a segment's size");
       tile_.record.segments.push_back({0, t.segment_bytes(i), tile_.coarse ? 0 : t.segment_crc(i)});
       const bool nothing = tile_.not_modified || without_bytes_;
       tile_.sent.push_back(!nothing && (t.segment_sent_size() == 0 || t.segment_sent(i)));
@@ -117,7 +120,8 @@ class TileAssembly {
       if (at_ == tile_.segments.size())
         return make_error(ErrorCode::kMalformed, "the server sent more bytes than the tile has");
       Bytes& bytes = tile_.segments[at_];
-      const std::size_t size = std::min<std::size_t>(data.size(), tile_.record.segments[at_].length - bytes.size());
+      const std::size_t size =
+          std::min<std::size_t>(data.size(), tile_.record.segments[at_].length - bytes.size());
       bytes.insert(bytes.end(), data.begin(), data.begin() + static_cast<std::ptrdiff_t>(size));
       data.remove_prefix(size);
     }

@@ -69,8 +69,8 @@ def points(packed, channels=()):
     return pb.Points(count=len(packed) // 12, xyz_f32=packed, channels=channels)
 
 
-def opening(name, writer=""):
-    return pb.InsertRequest(open=pb.InsertOpen(map=name, writer=writer))
+def opening(name, writer="", acknowledged=0):
+    return pb.InsertRequest(open=pb.InsertOpen(map=name, writer=writer, acknowledged=acknowledged))
 
 
 def scan(sequence, packed, **fields):

@@ -90,6 +90,17 @@ class Insert(DaemonTest):
         self.refuses(grpc.StatusCode.INVALID_ARGUMENT,
                      lambda: insert(self.stub, "m", [scan(9, scan_of(9, 10))], writer="r"), "missing")
 
+    def test_scans_that_add_nothing_leave_no_gap(self):
+        self.create()
+        same = scan_of(1, 1000)
+        self.assertEqual(insert(self.stub, "m", [scan(1, same), scan(2, same)], writer="r")[0], 2)
+        insert(self.stub, "m", [scan(3, same)], writer="r")
+        self.daemon.stop()
+        self.start()
+        replies = list(self.stub.Insert(iter([opening("m", "r", acknowledged=3), scan(4, scan_of(2, 1000))]), timeout=60))
+        self.assertEqual([r.sequence for r in replies], [3, 4])
+        self.assertEqual(self.stub.Stats(pb.StatsRequest(map="m"), timeout=10).map.points, 2000)
+
     def test_submaps_and_poses(self):
         self.create()
         pose = pb.Pose(translation=pb.Vector(x=100), qw=1)

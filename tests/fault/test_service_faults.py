@@ -35,7 +35,7 @@ class Robot(threading.Thread):
         return scan(sequence, scan_of(f"{self.writer}/{sequence}", POINTS))
 
     def requests(self, from_sequence):
-        yield opening("m", self.writer)
+        yield opening("m", self.writer, self.acknowledged)
         sequence = from_sequence.get()
         while sequence is not None and not self.enough.is_set():
             sequence += 1
@@ -75,7 +75,7 @@ class Robot(threading.Thread):
         stub = rpc.MapServiceStub(grpc.insecure_channel(self.where()))
         try:
             scans = [self.scan(i) for i in range(self.acknowledged + 1, self.last + 1)]
-            for reply in stub.Insert(iter([opening("m", self.writer), *scans]), timeout=60):
+            for reply in stub.Insert(iter([opening("m", self.writer, self.acknowledged), *scans]), timeout=60):
                 self.acknowledged = max(self.acknowledged, reply.sequence)
         except grpc.RpcError:
             time.sleep(0.05)

@@ -103,7 +103,8 @@ TEST(MapUrl, IsReadOrRefused) {
   EXPECT_EQ(parse_map_url("mapcodec://[::1]:7/m")->address, "[::1]:7");
   EXPECT_EQ(parse_map_url("mapcodec://unix:/a/b/m")->address, "unix:/a/b");
   EXPECT_EQ(parse_map_url("mapcodec://h:1")->map, "");
-  for (const char* bad : {"", "m", "mapcodec://", "mapcodec://h/m", "mapcodec://h:/m", "mapcodec://h:1/a/b", "http://h:1/m"})
+  for (const char* bad :
+       {"", "m", "mapcodec://", "mapcodec://h/m", "mapcodec://h:/m", "mapcodec://h:1/a/b", "http://h:1/m"})
     EXPECT_FALSE(parse_map_url(bad).ok()) << bad;
 }
 

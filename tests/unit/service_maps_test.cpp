@@ -60,7 +60,8 @@ class ServiceMaps : public ::testing::Test {
   /// Waits for the commit.
   Result<ScanReceipt> put(const std::string& name, Scan scan) {
     std::promise<Result<ScanReceipt>> done;
-    MAPCODEC_TRY(service_->insert(name, std::move(scan), [&](const Result<ScanReceipt>& r) { done.set_value(r); }));
+    MAPCODEC_TRY(
+        service_->insert(name, std::move(scan), [&](const Result<ScanReceipt>& r) { done.set_value(r); }));
     return done.get_future().get();
   }
   static Scan scan_of(unsigned seed, std::size_t count = 1000) {
@@ -83,7 +84,8 @@ class ServiceMaps : public ::testing::Test {
 };
 
 TEST_F(ServiceMaps, NamesThatAreNone) {
-  for (const char* name : {"", ".", "..", "../a", "a/b", ".a", "-a", "a b", "a\n", "\xC3\xA4"}) EXPECT_FALSE(is_map_name(name)) << name;
+  for (const char* name : {"", ".", "..", "../a", "a/b", ".a", "-a", "a b", "a\n", "\xC3\xA4"})
+    EXPECT_FALSE(is_map_name(name)) << name;
   for (const char* name : {"a", "A-1_b.c", "_", "0"}) EXPECT_TRUE(is_map_name(name)) << name;
   EXPECT_FALSE(is_map_name(std::string(101, 'a')));
   EXPECT_EQ(service_->view("../a").error().code, ErrorCode::kInvalidArgument);
@@ -110,12 +112,14 @@ TEST_F(ServiceMaps, ManyScansShareACommit) {
   open();
   std::atomic<int> done{0};
   for (unsigned i = 0; i < 50; ++i)
-    ASSERT_TRUE(service_->insert("m", scan_of(i, 100), [&](const Result<ScanReceipt>& r) { done += r.ok(); }).ok());
+    ASSERT_TRUE(
+        service_->insert("m", scan_of(i, 100), [&](const Result<ScanReceipt>& r) { done += r.ok(); }).ok());
   service_->drain();
   EXPECT_EQ(done, 50);
   EXPECT_EQ(points("m"), 5000u);
   EXPECT_LE(service_->stats("m")->revision, 4u);
-  EXPECT_EQ(service_->insert("m", scan_of(1), [](const Result<ScanReceipt>&) {}).error().code, ErrorCode::kBusy);
+  EXPECT_EQ(service_->insert("m", scan_of(1), [](const Result<ScanReceipt>&) {}).error().code,
+            ErrorCode::kBusy);
 }
 
 TEST_F(ServiceMaps, AFullQueueSaysBusyAndDoesNotGrow) {
@@ -215,7 +219,8 @@ TEST_F(ServiceMaps, SnapshotsRollbackAndCompaction) {
   EXPECT_EQ(points("m"), 1000u);
   EXPECT_NE(service_->view("m").value()->file, before->file);
   EXPECT_EQ(service_->view_of_file("m", before->file).value(), before);
-  for (std::size_t i = 0; i < before->archive->tiles().size(); ++i) EXPECT_TRUE(service_->segments(*before, i).ok());
+  for (std::size_t i = 0; i < before->archive->tiles().size(); ++i)
+    EXPECT_TRUE(service_->segments(*before, i).ok());
 }
 
 TEST_F(ServiceMaps, IdleMapsAreCompacted) {

@@ -19,14 +19,16 @@ namespace fs = std::filesystem;
 Result<ChildDaemon> ChildDaemon::start(const std::string& folder) {
   std::error_code error;
   const fs::path program = fs::read_symlink("/proc/self/exe", error).parent_path() / "mapcodecd";
-  if (!fs::exists(program, error)) return make_error(ErrorCode::kNotFound, program.string() + ": is not there");
+  if (!fs::exists(program, error))
+    return make_error(ErrorCode::kNotFound, program.string() + ": is not there");
   ChildDaemon d;
   d.folder_ = folder;
   fs::remove_all(folder, error);
   fs::create_directories(folder + "/maps", error);
   const std::string data = folder + "/maps", ports = folder + "/ports", log = folder + "/log";
-  std::vector<std::string> words{program.string(), "--data", data, "--listen", "127.0.0.1:0", "--http", "127.0.0.1:0",
-                                 "--port-file", ports, "--log-level", "warn"};
+  std::vector<std::string> words{
+      program.string(), "--data",      data,  "--listen",    "127.0.0.1:0", "--http",
+      "127.0.0.1:0",    "--port-file", ports, "--log-level", "warn"};
   std::vector<char*> argv;
   for (std::string& w : words) argv.push_back(w.data());
   argv.push_back(nullptr);
@@ -36,14 +38,17 @@ Result<ChildDaemon> ChildDaemon::start(const std::string& folder) {
   const int failed = posix_spawn(&d.pid_, program.c_str(), &actions, nullptr, argv.data(), environ);
   posix_spawn_file_actions_destroy(&actions);
   if (failed != 0) return make_error(ErrorCode::kUnreachable, "mapcodecd cannot be started");
-  for (int i = 0; i < 600 && !fs::exists(ports, error); ++i) std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  for (int i = 0; i < 600 && !fs::exists(ports, error); ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
   std::ifstream(ports) >> d.address_;
   if (d.address_.empty()) return make_error(ErrorCode::kUnreachable, "mapcodecd does not listen: see " + log);
   return d;
 }
 
 ChildDaemon::ChildDaemon(ChildDaemon&& other) noexcept
-    : pid_(std::exchange(other.pid_, -1)), address_(std::move(other.address_)), folder_(std::move(other.folder_)) {}
+    : pid_(std::exchange(other.pid_, -1)),
+      address_(std::move(other.address_)),
+      folder_(std::move(other.folder_)) {}
 
 ChildDaemon::~ChildDaemon() {
   if (pid_ > 0) (void)stop();

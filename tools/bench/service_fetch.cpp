@@ -91,7 +91,8 @@ Result<double> pull(v1::MapService::Stub& stub, double& cpu_s) {
   v1::GetTilesReply reply;
   std::uint64_t bytes = 0;
   while (reader->Read(&reply)) bytes += reply.data().size();
-  if (const grpc::Status s = reader->Finish(); !s.ok()) return make_error(ErrorCode::kUnreachable, s.error_message());
+  if (const grpc::Status s = reader->Finish(); !s.ok())
+    return make_error(ErrorCode::kUnreachable, s.error_message());
   cpu_s += cpu.seconds();
   return double(bytes) / watch.seconds() / 1e6;
 }
@@ -141,7 +142,8 @@ Status measure_fetch(const BenchSettings& settings, Report& report) {
   MAPCODEC_ASSIGN(const auto service, MapService::open(service_settings, coding, catalogue, metrics));
   daemon::GrpcSettings grpc_settings;
   grpc_settings.listen = {"127.0.0.1:0"};
-  MAPCODEC_ASSIGN(const auto server, daemon::GrpcServer::start(grpc_settings, *service, *access, metrics, {}));
+  MAPCODEC_ASSIGN(const auto server,
+                  daemon::GrpcServer::start(grpc_settings, *service, *access, metrics, {}));
   BareService bare(tiles);
   int port = 0;
   grpc::ServerBuilder builder;
@@ -168,10 +170,12 @@ Status measure_fetch(const BenchSettings& settings, Report& report) {
   report.line(fmt::format("\n## {} tiles of 64 kB, one reader, service and reader in one process\n", tiles));
   report.table({"", "MB/s", "tiles/s", "CPU s/GB", "of bare (median of pairs)", "one tile p50 ms", "p99 ms"});
   const double gigabytes = 1e-9 * double(rounds) * double(tiles * kTileBytes);
-  report.row({"GetTiles", digits(speed), digits(speed * 1e6 / double(kTileBytes)), digits(our_cpu / gigabytes),
-              digits(quantile(ratio, 0.5)), digits(1e3 * quantile(single, 0.5)), digits(1e3 * quantile(single, 0.99))});
+  report.row({"GetTiles", digits(speed), digits(speed * 1e6 / double(kTileBytes)),
+              digits(our_cpu / gigabytes), digits(quantile(ratio, 0.5)), digits(1e3 * quantile(single, 0.5)),
+              digits(1e3 * quantile(single, 0.99))});
   report.row({"bare stream", digits(quantile(bare_speed, 0.5)),
-              digits(quantile(bare_speed, 0.5) * 1e6 / double(kTileBytes)), digits(bare_cpu / gigabytes), "1", "", ""});
+              digits(quantile(bare_speed, 0.5) * 1e6 / double(kTileBytes)), digits(bare_cpu / gigabytes), "1",
+              "", ""});
   report.json()["fetch"] = {{"mb_per_second", speed},
                             {"bare_mb_per_second", quantile(bare_speed, 0.5)},
                             {"ratio", quantile(ratio, 0.5)},

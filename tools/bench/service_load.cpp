@@ -37,7 +37,8 @@ struct Shared {
 };
 
 /// Sends until told to stop. Durable within a window: what is counted was acknowledged.
-Status write(Shared& shared, const std::string& url, const PointCloud& scan, int number, const LoadSettings& s) {
+Status write(Shared& shared, const std::string& url, const PointCloud& scan, int number,
+             const LoadSettings& s) {
   MAPCODEC_ASSIGN(const MapClient client, MapClient::connect(url));
   SenderSettings sender_settings;
   sender_settings.writer = "writer-" + std::to_string(number);

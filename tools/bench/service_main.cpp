@@ -50,14 +50,16 @@ Json json_of(const LoadResult& r) {
 }
 
 void row_of(Report& report, const std::string& name, const LoadResult& r) {
-  report.row({name, digits(r.seconds), digits(r.points_per_second / 1e6), digits(double(r.revisions) / r.seconds),
-              digits(1e3 * quantile(r.waits_s, 0.5)), digits(1e3 * quantile(r.waits_s, 0.99)),
-              digits(double(r.tiles_read) / r.seconds), digits(double(r.bytes_read) / r.seconds / 1e6),
-              digits(r.daemon_cores), digits(quantile(r.resident_mb, 1)), std::to_string(r.faults.size())});
+  report.row({name, digits(r.seconds), digits(r.points_per_second / 1e6),
+              digits(double(r.revisions) / r.seconds), digits(1e3 * quantile(r.waits_s, 0.5)),
+              digits(1e3 * quantile(r.waits_s, 0.99)), digits(double(r.tiles_read) / r.seconds),
+              digits(double(r.bytes_read) / r.seconds / 1e6), digits(r.daemon_cores),
+              digits(quantile(r.resident_mb, 1)), std::to_string(r.faults.size())});
 }
 
-const std::vector<std::string> kHead{"load",     "s",    "M points/s",   "commits/s", "wait ms p50",      "p99",
-                                     "tiles/s read", "MB/s", "cores of daemon", "peak MB",   "faults"};
+const std::vector<std::string> kHead{
+    "load",         "s",    "M points/s",      "commits/s", "wait ms p50", "p99",
+    "tiles/s read", "MB/s", "cores of daemon", "peak MB",   "faults"};
 
 Status measure_load(const BenchSettings& settings, const PointCloud& scan, Report& report) {
   report.line(fmt::format("\n## Scans of {} points, max_error {} m\n", scan.size(), kPromise));
@@ -132,9 +134,12 @@ Status measure_sync(const BenchSettings& settings, const PointCloud& scan, Repor
   const auto step = [&](const std::string& name) -> Status {
     MAPCODEC_ASSIGN(const ReplicaReport r, copy.catch_up());
     report.row({name, std::to_string(r.tiles_fetched), digits(1e-3 * double(r.bytes_fetched), 4),
-                digits(1e-3 * double(r.bytes_whole), 4), digits(double(r.bytes_fetched) / double(r.bytes_whole))});
-    report.json()["sync"].push_back(
-        {{"after", name}, {"bytes_fetched", r.bytes_fetched}, {"bytes_whole", r.bytes_whole}, {"tiles_fetched", r.tiles_fetched}});
+                digits(1e-3 * double(r.bytes_whole), 4),
+                digits(double(r.bytes_fetched) / double(r.bytes_whole))});
+    report.json()["sync"].push_back({{"after", name},
+                                     {"bytes_fetched", r.bytes_fetched},
+                                     {"bytes_whole", r.bytes_whole},
+                                     {"tiles_fetched", r.tiles_fetched}});
     return {};
   };
   MAPCODEC_TRY(drive(0, settings.quick ? 20 : 100));

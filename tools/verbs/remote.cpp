@@ -80,7 +80,8 @@ Status send_file(ScanSender& sender, const std::string& path, const UpdateReques
 }
 
 std::string writer_name() {
-  return "mapcodec-" + std::to_string(::getpid()) + "-" + std::to_string(std::chrono::system_clock::now().time_since_epoch().count());
+  return "mapcodec-" + std::to_string(::getpid()) + "-" +
+         std::to_string(std::chrono::system_clock::now().time_since_epoch().count());
 }
 
 Result<std::unique_ptr<ScanSender>> open_sender(const MapClient& client) {
@@ -100,7 +101,8 @@ bool is_remote(const std::string& map) {
   return is_map_url(map);
 }
 
-Result<UpdateReport> update_remote(const std::string& map, const UpdateRequest& r, std::vector<std::string>& warnings) {
+Result<UpdateReport> update_remote(const std::string& map, const UpdateRequest& r,
+                                   std::vector<std::string>& warnings) {
   MAPCODEC_ASSIGN(const MapClient client, MapClient::connect(map));
   auto schema = schema_of(map);
   if (!schema.ok() && schema.error().code == ErrorCode::kNotFound && r.create) {
@@ -109,16 +111,20 @@ Result<UpdateReport> update_remote(const std::string& map, const UpdateRequest& 
   }
   if (!schema.ok()) return schema.error();
   const bool same = !r.promise || (*r.promise == schema->promise && r.promise_m == schema->promise_value);
-  if (!same) return make_error(ErrorCode::kInvalidArgument, "the map promises something else: an update cannot change that");
+  if (!same)
+    return make_error(ErrorCode::kInvalidArgument,
+                      "the map promises something else: an update cannot change that");
   MAPCODEC_ASSIGN(const auto sender, open_sender(client));
   UpdateReport report;
-  for (const std::string& path : r.inputs) MAPCODEC_TRY(send_file(*sender, path, r, *schema, report, warnings));
+  for (const std::string& path : r.inputs)
+    MAPCODEC_TRY(send_file(*sender, path, r, *schema, report, warnings));
   MAPCODEC_ASSIGN(report.revision, sender->finish());
   report.committed = true;
   return report;
 }
 
-Result<UpdateReport> merge_remote(const std::string& map, const MergeRequest& r, std::vector<std::string>& warnings) {
+Result<UpdateReport> merge_remote(const std::string& map, const MergeRequest& r,
+                                  std::vector<std::string>& warnings) {
   MAPCODEC_ASSIGN(const MapClient client, MapClient::connect(map));
   MAPCODEC_ASSIGN(const MapSchema schema, schema_of(map));
   MAPCODEC_ASSIGN(const auto sender, open_sender(client));
@@ -147,7 +153,8 @@ Result<UpdateReport> merge_remote(const std::string& map, const MergeRequest& r,
   return report;
 }
 
-Result<UpdateReport> erase_remote(const std::string& map, const std::optional<Erasure>& e, const std::string& submap) {
+Result<UpdateReport> erase_remote(const std::string& map, const std::optional<Erasure>& e,
+                                  const std::string& submap) {
   MAPCODEC_ASSIGN(const MapClient client, MapClient::connect(map));
   UpdateReport report;
   MAPCODEC_ASSIGN(report.revision, client.erase(e, submap.empty() ? std::nullopt : std::optional(submap)));

@@ -22,7 +22,8 @@ Result<UpdateReport> merge_remote(const std::string&, const MergeRequest&, std::
 Result<UpdateReport> erase_remote(const std::string&, const std::optional<Erasure>&, const std::string&) {
   return none();
 }
-Result<std::uint64_t> set_poses_remote(const std::string&, const std::vector<std::pair<std::string, PoseChange>>&) {
+Result<std::uint64_t> set_poses_remote(const std::string&,
+                                       const std::vector<std::pair<std::string, PoseChange>>&) {
   return none();
 }
 Result<std::uint64_t> snapshot_remote(const std::string&, const std::string&, bool) {

@@ -18,13 +18,15 @@ struct Arguments {
 
 void print(const Arguments& a, const ReplicaReport& r) {
   if (a.json) {
-    const Json line{{"revision", r.revision},           {"tiles_fetched", r.tiles_fetched},
-                    {"tiles_removed", r.tiles_removed}, {"bytes_fetched", r.bytes_fetched},
+    const Json line{{"revision", r.revision},
+                    {"tiles_fetched", r.tiles_fetched},
+                    {"tiles_removed", r.tiles_removed},
+                    {"bytes_fetched", r.bytes_fetched},
                     {"bytes_whole", r.bytes_whole}};
     fmt::print("{}\n", line.dump());
   } else {
-    fmt::print("{}: revision {}, {} tiles fetched ({} of {}), {} removed\n", a.copy, r.revision, r.tiles_fetched,
-               human_bytes(r.bytes_fetched), human_bytes(r.bytes_whole), r.tiles_removed);
+    fmt::print("{}: revision {}, {} tiles fetched ({} of {}), {} removed\n", a.copy, r.revision,
+               r.tiles_fetched, human_bytes(r.bytes_fetched), human_bytes(r.bytes_whole), r.tiles_removed);
   }
   std::fflush(stdout);
 }
@@ -52,7 +54,8 @@ int run(const Arguments& a) {
 
 void add_sync(CLI::App& app, Action& action) {
   auto a = std::make_shared<Arguments>();
-  CLI::App* verb = app.add_subcommand("sync", "Brings a copy of a map of a service up to date: fetches what differs");
+  CLI::App* verb =
+      app.add_subcommand("sync", "Brings a copy of a map of a service up to date: fetches what differs");
   verb->add_option("MAP", a->map, "mapcodec://HOST:PORT/MAP")->required();
   verb->add_option("COPY", a->copy, "The archive here; made if there is none")->required();
   verb->add_flag("--follow", a->follow, "Goes on as the map changes, until it is stopped");

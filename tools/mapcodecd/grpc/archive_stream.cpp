@@ -47,7 +47,8 @@ class ReadArchiveStream final : public ReplyStream<v1::ReadArchiveReply> {
     at_ = request_.offset();
     const std::uint64_t left = at_ <= whole ? whole - at_ : 0;
     if (at_ > whole || request_.length() > left)
-      return make_error(ErrorCode::kInvalidArgument, "the archive has only " + std::to_string(whole) + " bytes");
+      return make_error(ErrorCode::kInvalidArgument,
+                        "the archive has only " + std::to_string(whole) + " bytes");
     end_ = request_.length() == 0 ? whole : at_ + request_.length();
     return {};
   }
@@ -134,7 +135,8 @@ class UploadStream final : public grpc::ServerReadReactor<v1::UploadRequest>, pu
   }
 
   static Error cannot_write() {
-    return make_error(ErrorCode::kCannotWrite, "the archive cannot be stored: no space is left, or the disk fails");
+    return make_error(ErrorCode::kCannotWrite,
+                      "the archive cannot be stored: no space is left, or the disk fails");
   }
 
   Call call_;
@@ -148,15 +150,15 @@ class UploadStream final : public grpc::ServerReadReactor<v1::UploadRequest>, pu
 }  // namespace
 
 grpc::ServerWriteReactor<v1::ReadArchiveReply>* begin_read_archive(CallContext& context,
-                                                                  CallbackServerContext* grpc,
-                                                                  const v1::ReadArchiveRequest& request) {
+                                                                   CallbackServerContext* grpc,
+                                                                   const v1::ReadArchiveRequest& request) {
   auto* stream = new ReadArchiveStream(context, grpc, request);
   stream->begin(Right::read, request.map(), request.ByteSizeLong());
   return stream;
 }
 
 grpc::ServerReadReactor<v1::UploadRequest>* begin_upload(CallContext& context, CallbackServerContext* grpc,
-                                                        v1::RevisionReply* reply) {
+                                                         v1::RevisionReply* reply) {
   return new UploadStream(context, grpc, reply);
 }
 

@@ -54,7 +54,8 @@ struct CallContext {
   MapService& service;
   AccessControl& access;
   ServiceMetrics& metrics;
-  WorkerPool& pool;
+  WorkerPool& pool;   ///< for calls that may wait long
+  WorkerPool& steps;  ///< for streams: each step is short
   StreamList& streams;
   std::atomic<bool>& stopping;
   RecordRequest record;  ///< may be empty
@@ -121,7 +122,7 @@ class ReplyStream : public grpc::ServerWriteReactor<Reply>, public OpenStream {
   void begin(Right right, const std::string& map, std::size_t request_bytes) {
     Status s = call_.admit(right, map, CallKind::stream);
     if (s.ok()) s = call_.charge_in(request_bytes);
-    if (s.ok() && !call_.context.pool.try_post([this] { step(); }))
+    if (s.ok() && !call_.context.steps.try_post([this] { step(); }))
       s = make_error(ErrorCode::kBusy, "too many calls wait");
     if (!s.ok()) this->Finish(call_.end(s));
   }
@@ -133,7 +134,7 @@ class ReplyStream : public grpc::ServerWriteReactor<Reply>, public OpenStream {
     } else if (light_) {
       step();
     } else {
-      call_.context.pool.go_on([this] { step(); });
+      call_.context.steps.go_on([this] { step(); });
     }
   }
   void OnDone() override {

@@ -54,7 +54,8 @@ class DecodeStream final : public ReplyStream<v1::DecodeReply> {
     limits.max_bytes = kMostBytes;
     std::optional<unsigned> level;
     if (request_.level() > 0) level = request_.level() - 1;
-    MAPCODEC_ASSIGN(PointCloud cloud, call().context.service.coding().decode(spans, view_->schema, level, limits));
+    MAPCODEC_ASSIGN(PointCloud cloud,
+                    call().context.service.coding().decode(spans, view_->schema, level, limits));
     const RigidMotion motion = pose_of(view_->archive->info(), view_->archive->tiles()[index].submap);
     std::vector<std::uint32_t> kept;
     for (std::uint32_t i = 0; i < cloud.size(); ++i) {
@@ -98,7 +99,7 @@ class DecodeStream final : public ReplyStream<v1::DecodeReply> {
 }  // namespace
 
 grpc::ServerWriteReactor<v1::DecodeReply>* begin_decode(CallContext& context, CallbackServerContext* grpc,
-                                                       const v1::DecodeRequest& request) {
+                                                        const v1::DecodeRequest& request) {
   auto* stream = new DecodeStream(context, grpc, request);
   stream->begin(Right::read, request.map(), request.ByteSizeLong());
   return stream;

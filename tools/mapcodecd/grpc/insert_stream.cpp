@@ -83,6 +83,7 @@ class InsertStream final : public grpc::ServerBidiReactor<v1::InsertRequest, v1:
     MAPCODEC_ASSIGN(last, call_.context.service.last_sequence(open.map(), open.writer()));
     map_ = open.map();
     writer_ = open.writer();
+    acknowledged_ = last = std::max(last, open.acknowledged());
     reply_.set_opened(true);
     reply_.set_sequence(last);
     writing_ = true;
@@ -95,7 +96,8 @@ class InsertStream final : public grpc::ServerBidiReactor<v1::InsertRequest, v1:
       return make_error(ErrorCode::kMalformed, "sequence numbers of scans ascend from 1");
     last_sequence_ = message.sequence();
     Scan scan;
-    MAPCODEC_ASSIGN(scan.points, wire::read(message.points(), call_.context.service.settings().max_scan_points));
+    MAPCODEC_ASSIGN(scan.points,
+                    wire::read(message.points(), call_.context.service.settings().max_scan_points));
     scan.submap = message.submap();
     if (message.has_t_submap_scan()) {
       MAPCODEC_ASSIGN(scan.T_submap_scan, wire::read(message.t_submap_scan()));
@@ -105,11 +107,13 @@ class InsertStream final : public grpc::ServerBidiReactor<v1::InsertRequest, v1:
     }
     scan.writer = writer_;
     scan.sequence = writer_.empty() ? 0 : message.sequence();
+    scan.acknowledged = std::max(acknowledged_, durable_);
     const std::size_t points = scan.points.size();
     const std::uint64_t sequence = message.sequence();
-    MAPCODEC_TRY(call_.context.service.insert(
-        map_, std::move(scan),
-        [this, points, sequence](const Result<ScanReceipt>& receipt) { committed(points, sequence, receipt); }));
+    MAPCODEC_TRY(call_.context.service.insert(map_, std::move(scan),
+                                              [this, points, sequence](const Result<ScanReceipt>& receipt) {
+                                                committed(points, sequence, receipt);
+                                              }));
     ++under_way_;
     points_under_way_ += points;
     return {};
@@ -165,7 +169,7 @@ class InsertStream final : public grpc::ServerBidiReactor<v1::InsertRequest, v1:
   v1::InsertRequest request_;
   v1::InsertReply reply_;
   std::string map_, writer_;
-  std::uint64_t last_sequence_ = 0, durable_ = 0, told_ = 0, revision_ = 0;
+  std::uint64_t acknowledged_ = 0, last_sequence_ = 0, durable_ = 0, told_ = 0, revision_ = 0;
   std::size_t under_way_ = 0, points_under_way_ = 0;
   bool reading_ = false, writing_ = false, read_all_ = false, finished_ = false, durable_broken_ = false;
   Status status_;
@@ -175,7 +179,7 @@ class InsertStream final : public grpc::ServerBidiReactor<v1::InsertRequest, v1:
 }  // namespace
 
 grpc::ServerBidiReactor<v1::InsertRequest, v1::InsertReply>* begin_insert(CallContext& context,
-                                                                        CallbackServerContext* grpc) {
+                                                                          CallbackServerContext* grpc) {
   return new InsertStream(context, grpc);
 }
 

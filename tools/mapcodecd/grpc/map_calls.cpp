@@ -52,14 +52,15 @@ Status set(Result<std::uint64_t> revision, v1::RevisionReply& reply) {
 }  // namespace
 
 MapCalls::Unary* MapCalls::CreateMap(Context* c, const v1::CreateMapRequest* r, v1::CreateMapReply* reply) {
-  return answer(context_, c, "CreateMap", Right::admin, r->map(), r->ByteSizeLong(), [r, reply](Call& call) -> Status {
-    MAPCODEC_ASSIGN(const NewMap map, new_map(*r));
-    Retention retention;
-    if (r->keep_last() > 0) retention.keep_last = r->keep_last();
-    MAPCODEC_TRY(call.context.service.create(r->map(), map, retention, call.principal()));
-    reply->set_revision(1);
-    return {};
-  });
+  return answer(context_, c, "CreateMap", Right::admin, r->map(), r->ByteSizeLong(),
+                [r, reply](Call& call) -> Status {
+                  MAPCODEC_ASSIGN(const NewMap map, new_map(*r));
+                  Retention retention;
+                  if (r->keep_last() > 0) retention.keep_last = r->keep_last();
+                  MAPCODEC_TRY(call.context.service.create(r->map(), map, retention, call.principal()));
+                  reply->set_revision(1);
+                  return {};
+                });
 }
 
 MapCalls::Unary* MapCalls::ListMaps(Context* c, const v1::ListMapsRequest*, v1::ListMapsReply* reply) {
@@ -85,29 +86,32 @@ MapCalls::Unary* MapCalls::DeleteMap(Context* c, const v1::DeleteMapRequest* r, 
 }
 
 MapCalls::Unary* MapCalls::SetPoses(Context* c, const v1::SetPosesRequest* r, v1::RevisionReply* reply) {
-  return answer(context_, c, "SetPoses", Right::write, r->map(), r->ByteSizeLong(), [r, reply](Call& call) -> Status {
-    std::vector<MapService::NamedPose> poses;
-    for (const auto& p : r->poses()) {
-      MAPCODEC_ASSIGN(const PoseChange pose, wire::read(p.t_map_submap()));
-      poses.push_back({p.submap(), pose});
-    }
-    return set(call.context.service.set_poses(r->map(), std::move(poses)), *reply);
-  });
+  return answer(context_, c, "SetPoses", Right::write, r->map(), r->ByteSizeLong(),
+                [r, reply](Call& call) -> Status {
+                  std::vector<MapService::NamedPose> poses;
+                  for (const auto& p : r->poses()) {
+                    MAPCODEC_ASSIGN(const PoseChange pose, wire::read(p.t_map_submap()));
+                    poses.push_back({p.submap(), pose});
+                  }
+                  return set(call.context.service.set_poses(r->map(), std::move(poses)), *reply);
+                });
 }
 
 MapCalls::Unary* MapCalls::Erase(Context* c, const v1::EraseRequest* r, v1::RevisionReply* reply) {
-  return answer(context_, c, "Erase", Right::write, r->map(), r->ByteSizeLong(), [r, reply](Call& call) -> Status {
-    MAPCODEC_ASSIGN(std::optional<Erasure> e, erasure_of(*r));
-    const std::optional<std::string> submap = r->has_submap() ? std::optional(r->submap()) : std::nullopt;
-    return set(call.context.service.erase(r->map(), std::move(e), submap), *reply);
-  });
+  return answer(
+      context_, c, "Erase", Right::write, r->map(), r->ByteSizeLong(), [r, reply](Call& call) -> Status {
+        MAPCODEC_ASSIGN(std::optional<Erasure> e, erasure_of(*r));
+        const std::optional<std::string> submap = r->has_submap() ? std::optional(r->submap()) : std::nullopt;
+        return set(call.context.service.erase(r->map(), std::move(e), submap), *reply);
+      });
 }
 
 MapCalls::Unary* MapCalls::Snapshot(Context* c, const v1::SnapshotRequest* r, v1::RevisionReply* reply) {
   return answer(context_, c, "Snapshot", Right::write, r->map(), r->ByteSizeLong(), [r, reply](Call& call) {
     MapService& service = call.context.service;
-    return set(r->remove() ? service.remove_snapshot(r->map(), r->name()) : service.snapshot(r->map(), r->name()),
-               *reply);
+    return set(
+        r->remove() ? service.remove_snapshot(r->map(), r->name()) : service.snapshot(r->map(), r->name()),
+        *reply);
   });
 }
 
@@ -118,47 +122,49 @@ MapCalls::Unary* MapCalls::Rollback(Context* c, const v1::RollbackRequest* r, v1
 }
 
 MapCalls::Unary* MapCalls::Compact(Context* c, const v1::CompactRequest* r, v1::CompactReply* reply) {
-  return answer(context_, c, "Compact", Right::admin, r->map(), r->ByteSizeLong(), [r, reply](Call& call) -> Status {
-    CompactJob job;
-    if (r->keep_last() > 0) job.keep_last = r->keep_last();
-    MAPCODEC_ASSIGN(const CompactReport report, call.context.service.compact(r->map(), job));
-    reply->set_bytes_before(report.bytes_before);
-    reply->set_bytes_after(report.bytes_after);
-    reply->set_revisions_before(report.revisions_before);
-    reply->set_revisions_after(report.revisions_after);
-    reply->set_folded_tiles(report.folded_tiles);
-    return {};
-  });
+  return answer(context_, c, "Compact", Right::admin, r->map(), r->ByteSizeLong(),
+                [r, reply](Call& call) -> Status {
+                  CompactJob job;
+                  if (r->keep_last() > 0) job.keep_last = r->keep_last();
+                  MAPCODEC_ASSIGN(const CompactReport report, call.context.service.compact(r->map(), job));
+                  reply->set_bytes_before(report.bytes_before);
+                  reply->set_bytes_after(report.bytes_after);
+                  reply->set_revisions_before(report.revisions_before);
+                  reply->set_revisions_after(report.revisions_after);
+                  reply->set_folded_tiles(report.folded_tiles);
+                  return {};
+                });
 }
 
 MapCalls::Unary* MapCalls::Stats(Context* c, const v1::StatsRequest* r, v1::StatsReply* reply) {
-  return answer(context_, c, "Stats", Right::read, r->map(), r->ByteSizeLong(), [r, reply](Call& call) -> Status {
-    const ServiceStats s = call.context.service.stats();
-    reply->set_maps(s.maps);
-    reply->set_editors(s.editors);
-    reply->set_queued_scans(s.queued_scans);
-    reply->set_queued_points(s.queued_points);
-    reply->set_queue_limit_points(s.queue_limit_points);
-    reply->set_cache_bytes(s.cache_bytes);
-    reply->set_cache_limit_bytes(s.cache_limit_bytes);
-    reply->set_cache_hits(s.cache_hits);
-    reply->set_cache_misses(s.cache_misses);
-    reply->set_watchers(s.watchers);
-    reply->set_version(kVersion);
-    if (r->map().empty()) return {};
-    MAPCODEC_ASSIGN(const MapStats m, call.context.service.stats(r->map()));
-    v1::MapFigures& figures = *reply->mutable_map();
-    figures.set_revision(m.revision);
-    figures.set_tiles(m.tiles);
-    figures.set_points(m.points);
-    figures.set_live_bytes(m.live_bytes);
-    figures.set_file_bytes(m.file_bytes);
-    figures.set_queued_scans(m.queued_scans);
-    figures.set_queued_points(m.queued_points);
-    figures.set_editing(m.editing);
-    figures.set_compacting(m.compacting);
-    return {};
-  });
+  return answer(context_, c, "Stats", Right::read, r->map(), r->ByteSizeLong(),
+                [r, reply](Call& call) -> Status {
+                  const ServiceStats s = call.context.service.stats();
+                  reply->set_maps(s.maps);
+                  reply->set_editors(s.editors);
+                  reply->set_queued_scans(s.queued_scans);
+                  reply->set_queued_points(s.queued_points);
+                  reply->set_queue_limit_points(s.queue_limit_points);
+                  reply->set_cache_bytes(s.cache_bytes);
+                  reply->set_cache_limit_bytes(s.cache_limit_bytes);
+                  reply->set_cache_hits(s.cache_hits);
+                  reply->set_cache_misses(s.cache_misses);
+                  reply->set_watchers(s.watchers);
+                  reply->set_version(kVersion);
+                  if (r->map().empty()) return {};
+                  MAPCODEC_ASSIGN(const MapStats m, call.context.service.stats(r->map()));
+                  v1::MapFigures& figures = *reply->mutable_map();
+                  figures.set_revision(m.revision);
+                  figures.set_tiles(m.tiles);
+                  figures.set_points(m.points);
+                  figures.set_live_bytes(m.live_bytes);
+                  figures.set_file_bytes(m.file_bytes);
+                  figures.set_queued_scans(m.queued_scans);
+                  figures.set_queued_points(m.queued_points);
+                  figures.set_editing(m.editing);
+                  figures.set_compacting(m.compacting);
+                  return {};
+                });
 }
 
 }  // namespace mapcodec::daemon

@@ -39,7 +39,7 @@ class MapCalls final : public v1::MapService::CallbackService {
     return begin_diff(context_, c, *r);
   }
   grpc::ServerWriteReactor<v1::ReadArchiveReply>* ReadArchive(Context* c,
-                                                             const v1::ReadArchiveRequest* r) override {
+                                                              const v1::ReadArchiveRequest* r) override {
     return begin_read_archive(context_, c, *r);
   }
   grpc::ServerReadReactor<v1::UploadRequest>* Upload(Context* c, v1::RevisionReply* r) override {

@@ -30,7 +30,8 @@ Result<std::string> read_pem(const std::string& path) {
   return text.str();
 }
 
-Result<std::shared_ptr<grpc::ServerCredentials>> credentials_for(const ListenAddress& address, const TlsSettings& tls) {
+Result<std::shared_ptr<grpc::ServerCredentials>> credentials_for(const ListenAddress& address,
+                                                                 const TlsSettings& tls) {
   if (is_socket(address) || !tls.enabled()) return grpc::InsecureServerCredentials();
   grpc::SslServerCredentialsOptions options(GRPC_SSL_DONT_REQUEST_CLIENT_CERTIFICATE);
   grpc::SslServerCredentialsOptions::PemKeyCertPair pair;
@@ -65,7 +66,8 @@ struct GrpcServer::Impl {
   Impl(const GrpcSettings& s, MapService& m, AccessControl& a, ServiceMetrics& k, RecordRequest r)
       : settings(s),
         pool(s.workers, s.waiting_calls),
-        context{settings, m, a, k, pool, streams, stopping, std::move(r)},
+        steps(s.workers, s.waiting_calls),
+        context{settings, m, a, k, pool, steps, streams, stopping, std::move(r)},
         calls(context) {}
 
   Status listen(grpc::ServerBuilder& builder);
@@ -75,7 +77,7 @@ struct GrpcServer::Impl {
   const GrpcSettings settings;
   std::atomic<bool> stopping{false};
   StreamList streams;
-  WorkerPool pool;
+  WorkerPool pool, steps;
   CallContext context;
   MapCalls calls;
   std::vector<ListenAddress> asked;
@@ -151,7 +153,8 @@ Result<std::unique_ptr<GrpcServer>> GrpcServer::start(const GrpcSettings& settin
     ::umask(mask);
     MAPCODEC_TRY(s);
     if (impl->server == nullptr)
-      return make_error(ErrorCode::kCannotWrite, settings.listen.front() + ": cannot be bound (or bad certificates)");
+      return make_error(ErrorCode::kCannotWrite,
+                        settings.listen.front() + ": cannot be bound (or bad certificates)");
     MAPCODEC_TRY(impl->name_addresses());
     impl->clock = std::thread([i = impl.get()] { i->watch_clock(); });
     return std::unique_ptr<GrpcServer>(new GrpcServer(std::move(impl)));

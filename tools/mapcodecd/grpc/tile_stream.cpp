@@ -40,7 +40,8 @@ Result<TileSelection> selection_of(const v1::GetTilesRequest& r) {
   if (r.has_box()) s.box = wire::read(r.box());
   if (r.has_sphere()) s.sphere = {wire::read(r.sphere().centre()), r.sphere().radius()};
   if (r.has_pose()) {
-    if (r.has_sphere()) return make_error(ErrorCode::kInvalidArgument, "ask by a sphere or by a pose, not both");
+    if (r.has_sphere())
+      return make_error(ErrorCode::kInvalidArgument, "ask by a sphere or by a pose, not both");
     MAPCODEC_ASSIGN(const PoseChange pose, wire::read(r.pose()));
     s.sphere = {pose.translation_m, r.radius()};
   }
@@ -192,8 +193,9 @@ class TileStream final : public ReplyStream<v1::GetTilesReply> {
 
 }  // namespace
 
-grpc::ServerWriteReactor<v1::GetTilesReply>* begin_get_tiles(CallContext& context, CallbackServerContext* grpc,
-                                                            const v1::GetTilesRequest& request) {
+grpc::ServerWriteReactor<v1::GetTilesReply>* begin_get_tiles(CallContext& context,
+                                                             CallbackServerContext* grpc,
+                                                             const v1::GetTilesRequest& request) {
   auto* stream = new TileStream(context, grpc, request);
   stream->begin(Right::read, request.map(), request.ByteSizeLong());
   return stream;

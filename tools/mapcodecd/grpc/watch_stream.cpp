@@ -20,7 +20,7 @@ class WatchStream final : public grpc::ServerWriteReactor<v1::WatchReply>, publi
   void begin() {
     Status s = call_.admit(Right::read, request_.map(), CallKind::stream);
     const std::lock_guard lock(mutex_);
-    if (s.ok() && !call_.context.pool.try_post([this] { step(); }))
+    if (s.ok() && !call_.context.steps.try_post([this] { step(); }))
       s = make_error(ErrorCode::kBusy, "too many calls wait");
     busy_ = s.ok();
     if (!s.ok()) end(s);
@@ -28,8 +28,9 @@ class WatchStream final : public grpc::ServerWriteReactor<v1::WatchReply>, publi
 
   void OnWriteDone(bool ok) override {
     const std::lock_guard lock(mutex_);
-    if (!ok) ending_ = ending_.ok() ? Status(make_error(ErrorCode::kCancelled, "the client went away")) : ending_;
-    call_.context.pool.go_on([this] { step(); });
+    if (!ok)
+      ending_ = ending_.ok() ? Status(make_error(ErrorCode::kCancelled, "the client went away")) : ending_;
+    call_.context.steps.go_on([this] { step(); });
   }
   void OnCancel() override { ask_to_end(make_error(ErrorCode::kCancelled, "the client gave up")); }
   void wind_up() override { ask_to_end(make_error(ErrorCode::kUnreachable, "the daemon is about to end")); }
@@ -55,7 +56,7 @@ class WatchStream final : public grpc::ServerWriteReactor<v1::WatchReply>, publi
   void wake() {
     if (busy_ || finished_) return;
     busy_ = true;
-    call_.context.pool.go_on([this] { step(); });
+    call_.context.steps.go_on([this] { step(); });
   }
   void end(const Status& s) {
     finished_ = true;
@@ -76,7 +77,7 @@ class WatchStream final : public grpc::ServerWriteReactor<v1::WatchReply>, publi
     } else if (request_.once()) {
       end({});
     } else if (changed_) {
-      call_.context.pool.go_on([this] { step(); });
+      call_.context.steps.go_on([this] { step(); });
     } else {
       busy_ = false;
     }
@@ -173,14 +174,14 @@ class DiffStream final : public ReplyStream<v1::DiffReply> {
 }  // namespace
 
 grpc::ServerWriteReactor<v1::WatchReply>* begin_watch(CallContext& context, CallbackServerContext* grpc,
-                                                     const v1::WatchRequest& request) {
+                                                      const v1::WatchRequest& request) {
   auto* stream = new WatchStream(context, grpc, request);
   stream->begin();
   return stream;
 }
 
 grpc::ServerWriteReactor<v1::DiffReply>* begin_diff(CallContext& context, CallbackServerContext* grpc,
-                                                   const v1::DiffRequest& request) {
+                                                    const v1::DiffRequest& request) {
   auto* stream = new DiffStream(context, grpc, request);
   stream->begin(Right::read, request.map(), request.ByteSizeLong());
   return stream;
