@@ -81,7 +81,8 @@ class Octrees(ProgramTest):
         self.assertEqual(self.path("old.bt").read_bytes(), first.read_bytes())
         self.succeeds("compact", archive)
         self.succeeds("verify", archive, "--against", second)
-        self.fails(USAGE, "update", archive, write(self.path("c.ot"), small_ot()))
+        full = self.compress(write(self.path("c.ot"), small_ot()), name="full.mapc")
+        self.fails(USAGE, "update", full, first)  # log-odds are not made up
 
     def test_points_and_an_octree_in_one_archive(self):
         points = write(self.path("in.pcd"), pcd_bytes(room(20000, RGB)))
