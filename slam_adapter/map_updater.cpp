@@ -539,13 +539,6 @@ Status MapUpdater::set_stamps(std::uint32_t submap, double first_s, double last_
   return state_->writer.set_info(std::move(info));
 }
 
-Status MapUpdater::set_extra(const std::string& name, Bytes value) {
-  MapInfo info = state_->writer.info();
-  info.extras[name] = std::move(value);
-  state_->changed = true;
-  return state_->writer.set_info(std::move(info));
-}
-
 Status MapUpdater::insert(PointCloud points, std::uint32_t submap) {
   State& s = *state_;
   std::uint64_t dropped = 0;
@@ -590,8 +583,9 @@ void MapUpdater::add_input_bytes(std::uint64_t bytes) {
   state_->input_bytes += bytes;
 }
 
-void MapUpdater::set_extra(const std::string& name, Bytes value) {
+void MapUpdater::set_extra(const std::string& name, Bytes value, bool alone) {
   state_->extras[name] = std::move(value);
+  if (alone) state_->changed = true;
 }
 
 Status MapUpdater::flush() {

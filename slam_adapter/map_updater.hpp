@@ -77,8 +77,6 @@ class MapUpdater {
 
   /// When the scans of a submap were taken [s since epoch]. Errors: InvalidArgument (no such submap).
   [[nodiscard]] Status set_stamps(std::uint32_t submap, double first_s, double last_s);
-  /// MapInfo::extras of the next revision.
-  [[nodiscard]] Status set_extra(const std::string& name, Bytes value);
 
   /// @param points  [m, submap frame]; channels in any order. What the map does not keep is left out; what it
   /// keeps must be there. Points that are not finite are dropped and counted (lossless maps: kept).
@@ -93,8 +91,8 @@ class MapUpdater {
   [[nodiscard]] Status fold(std::size_t least = 1);
   /// For the record: size of what was inserted.
   void add_input_bytes(std::uint64_t bytes);
-  /// A fact of the next revision (MapInfo::extras); alone it makes none.
-  void set_extra(const std::string& name, Bytes value);
+  /// A fact of the next revision (MapInfo::extras). @param alone  makes one even if nothing else changed.
+  void set_extra(const std::string& name, Bytes value, bool alone = false);
   /// Codes what was inserted. Called as needed.
   [[nodiscard]] Status flush();
 

@@ -19,7 +19,7 @@ struct ReadOptions {
   /// Metres per unit of the file: multiplies x, y, z (3DTK's centimetres: 0.01). Anything but 1 makes the
   /// coordinates f64, since a product is no longer a number that the file stored.
   double unit_m = 1;
-  BagOptions bag;
+  BagOptions bag = {};
 };
 
 /// Opens a point file as blocks of at most 65,536 points.

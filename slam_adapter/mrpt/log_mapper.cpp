@@ -273,7 +273,7 @@ class LogMapper {
   }
 
   Status commit() {
-    MAPCODEC_TRY(map_->set_extra(kMapProgressExtra, write_progress(progress_)));
+    map_->set_extra(kMapProgressExtra, write_progress(progress_), true);
     if (const auto done = map_->commit(r_.timestamp_s); !done.ok()) return done.error();
     ++report_.commits;
     committed_ = progress_.keyframes;

@@ -19,13 +19,14 @@ struct LogSurvey {
   std::vector<std::string> missing;  ///< channels that not all observations have
   std::uint64_t frames = 0, file_bytes = 0;
   std::uint64_t planar_frames = 0, with_odometry = 0, with_pose = 0, without_stamp = 0;
-  PoseTrack robot_poses;  ///< that the log itself states, where they have stamps
-  bool moves = false;     ///< some pose is not the identity
+  PoseTrack robot_poses;        ///< that the log itself states, where they have stamps
+  bool moves = false;           ///< some pose is not the identity
   std::optional<Error> damage;  ///< that ended the look; what came before it counts
   /// Sentences: stamps that run backwards, or leave a gap of more than a minute.
   std::vector<std::string> jumps;
 };
-/// Errors: those of RawlogReader where nothing came before them; Empty (no observation with points, naming what there is; no such sensor).
+/// Errors: those of RawlogReader where nothing came before them; Empty (no observation with points, naming
+/// what there is; no such sensor).
 [[nodiscard]] Result<LogSurvey> survey_log(const std::string& path, const RawlogOptions& options);
 
 enum class PoseSource { file, log, odometry, none };

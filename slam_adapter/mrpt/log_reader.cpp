@@ -381,8 +381,8 @@ Error explained(const ObjectArchive& in, const std::string& object, const std::s
   return make_error(ErrorCode::kMalformed, "MRPT cannot read a " + object, in.position());
 }
 
-/// Images beside a log lie in NAME_Images or Images. MRPT 2.5.8 looks for them in the wrong place where the log's
-/// path has a folder.
+/// Images beside a log lie in NAME_Images or Images. MRPT 2.5.8 looks for them in the wrong place where the
+/// log's path has a folder.
 std::string images_folder(const std::string& path) {
   namespace fs = std::filesystem;
   fs::path name = fs::path(path).filename();

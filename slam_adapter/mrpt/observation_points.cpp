@@ -150,7 +150,8 @@ std::string rotating(const CObservationRotatingScan& o, const ProjectionSettings
   const std::vector<double> elevation = elevations(o);
   if (rows == 0 || columns == 0) return "no ranges";
   if (std::size_t(rows) > elevation.size())
-    return "the elevation of its rings is not known (scanner '" + o.lidarModel.substr(0, kLongestLabel) + "')";
+    return "the elevation of its rings is not known (scanner '" + o.lidarModel.substr(0, kLongestLabel) +
+           "')";
   const bool shines = o.intensityImage.rows() == rows && o.intensityImage.cols() == columns;
   if (shines) add_layout(f.points, kIntensity);
   add_layout(f.points, kRing);

@@ -4,6 +4,7 @@
 
 #include <string>
 
+#include "mapcodec/base/bytes.hpp"
 #include "mapcodec/base/decode_limits.hpp"
 #include "mapcodec/base/result.hpp"
 #include "mapcodec/cloud/occupancy_tree.hpp"

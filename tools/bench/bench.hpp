@@ -57,5 +57,8 @@ struct BenchSettings {
 /// A mapcodecd under load: tiles beside a bare gRPC stream, copies that follow, writers and readers, memory
 /// over minutes (service.json, service.md, service_soak.png). There where the service is built.
 [[nodiscard]] Status bench_service(const BenchSettings& settings);
+/// Rawlogs and simplemaps beside MRPT's own reading of them (mrpt.json, mrpt.md). Needs mrpt_peer beside this
+/// program.
+[[nodiscard]] Status bench_mrpt(const BenchSettings& settings);
 
 }  // namespace mapcodec

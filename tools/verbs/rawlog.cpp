@@ -79,7 +79,7 @@ Status choose_poses(Arguments& a) {
   }
   if (r.poses != Poses::file && !r.pose_file.empty())
     return make_error(ErrorCode::kInvalidArgument, "--poses-file is for --poses file");
-  if (examples::has_gicp()) {
+  if (examples::has_pcl()) {
     r.registrar = [voxel = a.voxel_m, reach = a.reach_m](const PointCloud& scan, const LocalMapView& view,
                                                          const MapPose& guess) {
       return register_scan(scan, view, guess, voxel, reach);
