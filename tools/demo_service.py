@@ -63,7 +63,10 @@ class ServiceDemo:
 
     def write_scans(self, source):
         """Each robot saw half of the table, from its own place."""
-        points = points_of(source)
+        whole, plain = self.folder / "whole.mapc", self.folder / "whole.pcd"
+        self.run("compress", source, "-o", whole, "--lossless", "--progress", "none")
+        self.run("decompress", whole, "-o", plain, "--progress", "none")  # as binary
+        points = points_of(plain)
         for robot in range(2):
             for k in range(SCANS_OF_A_ROBOT):
                 write_scan(self.folder / f"robot{robot}-{k}.pcd", points[robot * SCANS_OF_A_ROBOT + k::2 * SCANS_OF_A_ROBOT])
