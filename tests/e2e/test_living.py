@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Maps that live: update, remove, crop, pose, merge, and the revisions that come of it."""
+import fcntl
 import unittest
 
 from clouds import FULL, RGB, XYZ, pcd_bytes, positions, read_pcd, room, write
@@ -135,6 +136,29 @@ class Living(ProgramTest):
         self.succeeds("compact", self.map)
         self.succeeds("verify", self.map)
         self.assertEqual(len(self.points("--revision", "before")), 4000)
+
+    def test_two_writers(self):
+        self.succeeds("compress", self.first, "-o", self.map, "--max-error", 0.005)
+        before = self.map.read_bytes()
+        with open(self.map, "rb") as other:
+            fcntl.flock(other, fcntl.LOCK_EX)
+            for work in (("update", self.map, self.second), ("compact", self.map), ("remove", self.map, "--box", "0,0,0,1,1,1"),
+                         ("snapshot", self.map, "x")):
+                self.fails(CANNOT_WRITE, *work, names=self.map, says="another program is writing")
+            self.succeeds("verify", self.map)  # readers need no lock
+        self.assertEqual(self.map.read_bytes(), before)
+        self.succeeds("update", self.map, self.second)
+
+    def test_a_newer_format_or_no_archive(self):
+        self.succeeds("compress", self.first, "-o", self.map, "--max-error", 0.005)
+        newer = bytearray(self.map.read_bytes())
+        newer[6] = 9
+        newer = write(self.path("newer.mapc"), newer)
+        for archive, says in ((newer, "version 9"), (self.first, "not a mapcodec archive"), (self.path("gone.mapc"), "no such file")):
+            for work in (("update", archive, self.second), ("remove", archive, "--box", "0,0,0,1,1,1"), ("merge", archive, self.map),
+                         ("pose", archive, "--submap", "a", "--pose", "0,0,0,0,0,0,1")):
+                self.fails(BAD_INPUT, *work, names=archive, says=says)
+        self.assertFalse(self.path("gone.mapc").exists())
 
     def test_read_only_map(self):
         self.succeeds("compress", self.first, "-o", self.map, "--max-error", 0.005)

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <filesystem>
+
 #include <algorithm>
 #include <chrono>
 #include <thread>
@@ -368,6 +370,12 @@ TEST(LocalMap, SubmapsStandWhereTheirPosesSay) {
   ASSERT_TRUE(*local->wait_ready(kLong));
   const auto moved = local->view();
   EXPECT_EQ(moved->revision(), 2u);
+
+  // The file goes away: what is loaded stays, and looking for news says why there are none.
+  std::filesystem::remove(map.path);
+  EXPECT_EQ(local->refresh().error().code, ErrorCode::kNotFound);
+  EXPECT_EQ(local->view()->revision(), 2u);
+  EXPECT_TRUE(local->view()->ready());
   ASSERT_EQ(moved->tiles().size(), 2u);
   for (std::size_t i = 0; i < 2; ++i) EXPECT_EQ(moved->tiles()[i].content, view->tiles()[i].content);
   EXPECT_LT(moved->nearest({95 + p[0], 2 + p[1], p[2]}, 1)[0].distance_m, 1e-5);
