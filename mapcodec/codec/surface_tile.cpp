@@ -5,7 +5,7 @@
 
 #include "mapcodec/attribute/channel_encoder.hpp"
 #include "mapcodec/codec/surface_encoder.hpp"
-#include "mapcodec/codec/surface_transfer.hpp"
+#include "mapcodec/codec/surface_color.hpp"
 #include "mapcodec/codec/tile_sections.hpp"
 #include "mapcodec/quality/density.hpp"
 #include "mapcodec/quality/grid_nearest.hpp"
@@ -59,12 +59,12 @@ Channel on_decoded(const ChannelSchema& channel, const Channel& original, const 
 class TileChannels {
  public:
   TileChannels(const PointCloud& tile, const MapSchema& schema, const NearestPair& near, Effort effort,
-               double color_loss)
+               double color_slope)
       : tile_(tile),
         schema_(schema),
         near_(near),
         effort_(effort),
-        color_loss_(color_loss),
+        color_slope_(color_slope),
         coded_(coded_channels(schema, CodecId::surface)) {}
 
   /// Colour first: it decides on the voxels.
@@ -81,9 +81,10 @@ class TileChannels {
       const std::size_t c = coded_[color];
       MAPCODEC_ASSIGN(SurfaceColor e,
                       encode_surface_color(schema_.channels[c], tile_.channels[c], near_,
-                                           SamePositions(tile_.xyz), encoding, effort_, color_loss_));
+                                           SamePositions(tile_.xyz), encoding, effort_, color_slope_));
       r.channels[color] = std::move(e.bytes);
       r.errors.color_error = e.error;
+      r.least_color_error = e.least_error;
       shift = e.voxel_shift;
     }
     const surface::VoxelOrder sorted = set_voxels(encoding, shift);
@@ -110,20 +111,20 @@ class TileChannels {
   const MapSchema& schema_;
   const NearestPair& near_;
   Effort effort_;
-  double color_loss_;
+  double color_slope_;
   std::vector<std::size_t> coded_;
 };
 
 }  // namespace
 
 Result<SurfaceTile> encode_surface_tile(const PointCloud& tile, const MapSchema& schema, double step_m,
-                                        Effort effort, double color_loss) {
+                                        Effort effort, double color_slope) {
   const Quantizer lattice{schema.origin, step_m, schema.coordinates.kind};
   MAPCODEC_ASSIGN(SurfaceEncoding e, encode_surface(tile.xyz, lattice, {effort}));
   const NearestPair near = find_nearest_pair(tile.xyz, e.decoded);
   SurfaceTile r;
   measure(tile.xyz, e.decoded, near, r);
-  MAPCODEC_TRY(TileChannels(tile, schema, near, effort, color_loss).encode(e, r));
+  MAPCODEC_TRY(TileChannels(tile, schema, near, effort, color_slope).encode(e, r));
   r.geometry = std::move(e.bytes);
   return r;
 }

@@ -16,12 +16,13 @@ struct SurfaceTile {
   TileErrors errors;            ///< max_axis_error_m is an upper bound
   double rms_forward_m = 0;     ///< original -> decoded
   double rms_backward_m = 0;    ///< decoded -> original
+  double least_color_error = 0; ///< that the positions allow, about; 0 without bounded colour
 };
 
 /// @param tile  at least one point; channels as in schema.channels.
 /// @param step_m  surface step.
 /// Errors: InvalidArgument (as encode_surface and encode_channel).
 [[nodiscard]] Result<SurfaceTile> encode_surface_tile(const PointCloud& tile, const MapSchema& schema,
-                                                      double step_m, Effort effort, double color_loss = 0);
+                                                      double step_m, Effort effort, double color_slope = 0);
 
 }  // namespace mapcodec

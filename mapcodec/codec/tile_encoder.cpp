@@ -129,7 +129,7 @@ Result<EncodedTile> encode_by_surfaces(const PointCloud& tile, const MapSchema& 
                                        const TileSettings& settings) {
   const double step_m = step_of(schema, settings);
   MAPCODEC_ASSIGN(const SurfaceTile t,
-                  encode_surface_tile(tile, schema, step_m, settings.effort, settings.color_loss));
+                  encode_surface_tile(tile, schema, step_m, settings.effort, settings.color_slope));
   ByteWriter out;
   EncodedTile r = begin_tile(tile, schema, CodecId::surface, tile.size(), step_m, out);
   append_section(out, t.geometry, t.channels.empty());
@@ -139,6 +139,7 @@ Result<EncodedTile> encode_by_surfaces(const PointCloud& tile, const MapSchema& 
   r.errors = t.errors;
   r.rms_forward_m = t.rms_forward_m;
   r.rms_backward_m = t.rms_backward_m;
+  r.least_color_error = t.least_color_error;
   r.bytes = out.take();
   return r;
 }
