@@ -205,7 +205,7 @@ class ColorWalk {
     const std::int64_t own = settings_.coarse ? kOwnWeightOfCoarse : kOwnWeight;
     std::int64_t weight = own;
     ColorPoint sum{};
-    for (std::size_t c = 0; c < 3; ++c) sum[c] = means_[n][c] * kOwnWeight;
+    for (std::size_t c = 0; c < 3; ++c) sum[c] = means_[n][c] * own;
     for (std::uint32_t axis = 0; axis < 3; ++axis) {
       const std::uint32_t face = node.faces[2 * axis + ((octant >> axis) & 1)];
       if (face == kNoNode) continue;
