@@ -47,7 +47,8 @@ class CodedSum {
   [[nodiscard]] double surface_share() const { return points_ == 0 ? 0 : surface_points_ / points_; }
 
  private:
-  double points_ = 0, forward_ = 0, backward_ = 0, color_ = 0, least_color_ = 0, density_ = 0, max_axis_ = 0, bytes_ = 0;
+  double points_ = 0, forward_ = 0, backward_ = 0, color_ = 0, least_color_ = 0, density_ = 0, max_axis_ = 0,
+         bytes_ = 0;
   double geometry_bytes_ = 0, surface_points_ = 0;
 };
 

@@ -218,8 +218,8 @@ bool CompressJob::meets_rms_or_adjust() {
   return false;
 }
 
-/// All surface tiles save their last bit at one price in error: so bits go where they help most. Positions are
-/// made finer only where no price is low enough and the bound was asked for.
+/// All surface tiles save their last bit at one price in error: so bits go where they help most. Positions
+/// are made finer only where no price is low enough and the bound was asked for.
 CompressJob::ColorState CompressJob::adjust_map_color(double asked_bound) {
   const double error = coded_.errors().color_error;
   // Coming near what is least takes many bits for little: nobody asked for that.
@@ -233,8 +233,7 @@ CompressJob::ColorState CompressJob::adjust_map_color(double asked_bound) {
     ++color_tries_;
     return ColorState::finer_positions;
   }
-  if (error <= bound &&
-      (error >= kNearColor * bound || color_slope_ >= most || color_tries_ >= kColorTries))
+  if (error <= bound && (error >= kNearColor * bound || color_slope_ >= most || color_tries_ >= kColorTries))
     return ColorState::met;
   if (!color_secant_) color_secant_.emplace(kColorAim * bound, kColorExponent, kColorLeap);
   color_slope_ = std::clamp(color_secant_->next(color_slope_, error), least, most);

@@ -11,8 +11,8 @@ namespace mapcodec {
 /// what is known.
 class LogSecant {
  public:
-  /// @param slope  first guess of d log(value) / d log(step). @param longest_leap  of log(step): what is far away
-  /// is not as the slope here says.
+  /// @param slope  first guess of d log(value) / d log(step). @param longest_leap  of log(step): what is far
+  /// away is not as the slope here says.
   LogSecant(double target, double slope, double longest_leap = 1.1)
       : target_(std::log(target)), slope_(slope), longest_leap_(longest_leap) {}
 

@@ -92,8 +92,8 @@ class WeighingPolicy {
   void enter_split(std::uint32_t begin, std::uint32_t middle, std::uint32_t end) {
     // The first part moves by the share of the second, and the other way round.
     const double share = double(end - middle) / double(end - begin);
-    curvature_ = aims_.weight(begin, middle) * share * share +
-                 aims_.weight(middle, end) * (1 - share) * (1 - share);
+    curvature_ =
+        aims_.weight(begin, middle) * share * share + aims_.weight(middle, end) * (1 - share) * (1 - share);
   }
   [[nodiscard]] bool ok() const { return true; }
 

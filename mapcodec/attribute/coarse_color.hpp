@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Colours coded in so few bits that most splits have no symbols: each symbol is weighed against what it costs.
-// Encoder only; the decoder is decode_color.
+// Colours coded in so few bits that most splits have no symbols: each symbol is weighed against what it
+// costs. Encoder only; the decoder is decode_color.
 #pragma once
 
 #include <array>

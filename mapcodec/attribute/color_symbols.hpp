@@ -8,10 +8,10 @@
 namespace mapcodec {
 
 struct ColorModels {
-  std::array<BitModel, 16 * 6 * 4> any{};  ///< gain, around, above
+  std::array<BitModel, 16 * 6 * 4> any{};          ///< gain, around, above
   std::array<BitModel, 16 * 12 * 8> any_coarse{};  ///< gain, busy, expected size of the first component
   std::array<BitModel, 3 * 8> against{};           ///< component, expected size: sign is not the expected one
-  std::array<BitModel, 3 * 6 * 4> zero{};  ///< component, around, non-zero components before it
+  std::array<BitModel, 3 * 6 * 4> zero{};          ///< component, around, non-zero components before it
   std::array<std::array<MagnitudeModel, 6>, 3> magnitude{};  ///< |q| - 1: component, around
 };
 

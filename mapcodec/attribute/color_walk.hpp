@@ -20,7 +20,8 @@ struct ColorSettings {
   std::uint32_t levels = 0;  ///< levels whose splits are coded; deeper ones are only predicted
   bool split_cells = false;  ///< points that share a finest cell get values of their own
   ColorScale scale = ColorScale::eight;
-  bool coarse = false;  ///< for steps so wide that most splits have no symbols: what is predicted counts in contexts
+  bool coarse =
+      false;  ///< for steps so wide that most splits have no symbols: what is predicted counts in contexts
 };
 
 /// What is known of a split before its symbols.
@@ -30,8 +31,8 @@ struct SplitContext {
   std::uint32_t above = 0;   ///< symbols of the cell above, 0..3
   // Coarse settings only:
   bool coarse = false;
-  std::uint32_t busy = 0;                    ///< symbols of all these and of the cell itself so far, 0..11
-  std::array<std::uint32_t, 3> expected{};   ///< size of the predicted difference to a step, 0..7
+  std::uint32_t busy = 0;                   ///< symbols of all these and of the cell itself so far, 0..11
+  std::array<std::uint32_t, 3> expected{};  ///< size of the predicted difference to a step, 0..7
   std::array<bool, 3> expected_negative{};
 };
 
@@ -302,8 +303,8 @@ class ColorWalk {
     context_.busy = std::min(11u, static_cast<std::uint32_t>(std::bit_width(busy_ + 4 * symbols_)));
     for (std::size_t c = 0; c < 3; ++c) {
       const auto size = static_cast<std::uint64_t>(d[c] < 0 ? -d[c] : d[c]);
-      context_.expected[c] =
-          std::min(7u, static_cast<std::uint32_t>(std::bit_width(16 * size / static_cast<std::uint64_t>(steps[c]))));
+      context_.expected[c] = std::min(
+          7u, static_cast<std::uint32_t>(std::bit_width(16 * size / static_cast<std::uint64_t>(steps[c]))));
       context_.expected_negative[c] = d[c] < 0;
     }
   }

@@ -105,7 +105,9 @@ class ColorSearch {
         near_(near),
         ties_(ties),
         encoding_(encoding),
-        passes_(effort == Effort::fast ? 2 : effort == Effort::standard ? 3 : 4),
+        passes_(effort == Effort::fast       ? 2
+                : effort == Effort::standard ? 3
+                                             : 4),
         scale_(color_scale_of(original)),
         comparisons_(original, scale_, near, ties) {}
 
@@ -207,8 +209,8 @@ class ColorSearch {
       const auto v = load_rgb(decoded, begin);
       float weight = 0;
       const Rgb aim = mean_around(
-          samples, {static_cast<float>(v[0]) * unit, static_cast<float>(v[1]) * unit,
-                    static_cast<float>(v[2]) * unit},
+          samples,
+          {static_cast<float>(v[0]) * unit, static_cast<float>(v[1]) * unit, static_cast<float>(v[2]) * unit},
           alike, weight);
       sum += double(weight);
       for (std::uint32_t i = begin; i < end; ++i) {

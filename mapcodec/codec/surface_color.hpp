@@ -19,8 +19,8 @@ struct SurfaceColor {
 /// positions meet the bound, a little above the least error.
 ///
 /// The error is a mean of distances, not of their squares: what points should have is the median of the
-/// originals that they are compared with [Weiszfeld 1937], and what a deviation costs is its square divided by
-/// the distance that is there anyway. So rough places get fewer bits than squares would give them.
+/// originals that they are compared with [Weiszfeld 1937], and what a deviation costs is its square divided
+/// by the distance that is there anyway. So rough places get fewer bits than squares would give them.
 /// @param encoding  for its points; unchanged. @param near  of originals and encoding.decoded.
 /// @param slope  > 0: not the bound is the aim. Squared steps [8-bit levels^2] are slope times the usual
 /// distance, and bits are weighed accordingly: so all tiles of a map save the last bit at the same price in

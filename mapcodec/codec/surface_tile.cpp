@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "mapcodec/attribute/channel_encoder.hpp"
-#include "mapcodec/codec/surface_encoder.hpp"
 #include "mapcodec/codec/surface_color.hpp"
+#include "mapcodec/codec/surface_encoder.hpp"
 #include "mapcodec/codec/tile_sections.hpp"
 #include "mapcodec/quality/density.hpp"
 #include "mapcodec/quality/grid_nearest.hpp"

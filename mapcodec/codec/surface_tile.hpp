@@ -11,12 +11,12 @@ namespace mapcodec {
 
 struct SurfaceTile {
   Bytes geometry;
-  std::vector<Bytes> channels;  ///< sections, as coded_channels lists them
-  Box bounds;                   ///< of the decoded points
-  TileErrors errors;            ///< max_axis_error_m is an upper bound
-  double rms_forward_m = 0;     ///< original -> decoded
-  double rms_backward_m = 0;    ///< decoded -> original
-  double least_color_error = 0; ///< that the positions allow, about; 0 without bounded colour
+  std::vector<Bytes> channels;   ///< sections, as coded_channels lists them
+  Box bounds;                    ///< of the decoded points
+  TileErrors errors;             ///< max_axis_error_m is an upper bound
+  double rms_forward_m = 0;      ///< original -> decoded
+  double rms_backward_m = 0;     ///< decoded -> original
+  double least_color_error = 0;  ///< that the positions allow, about; 0 without bounded colour
 };
 
 /// @param tile  at least one point; channels as in schema.channels.

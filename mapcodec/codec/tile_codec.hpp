@@ -79,8 +79,8 @@ struct EncodedTile {
   std::uint64_t geometry_bytes = 0;  ///< of `bytes`, what is not channels
   Box bounds;                        ///< of the decoded points and the original ones
   TileErrors errors;
-  double rms_forward_m = 0;   ///< root mean square distance of the original points to the decoded ones
-  double rms_backward_m = 0;  ///< of the decoded points to the original ones
+  double rms_forward_m = 0;      ///< root mean square distance of the original points to the decoded ones
+  double rms_backward_m = 0;     ///< of the decoded points to the original ones
   double least_color_error = 0;  ///< surface: what colours on these positions lose at least, about
 };
 
