@@ -64,6 +64,7 @@ void CodedSum::add(const EncodedTile& t) {
   forward_ += squares(t, t.rms_forward_m);
   backward_ += squares(t, t.rms_backward_m);
   color_ += n * t.errors.color_error;
+  least_color_ += n * t.least_color_error;
   density_ += n * t.errors.density_error;
   max_axis_ = std::max(max_axis_, t.errors.max_axis_error_m);
   bytes_ += static_cast<double>(t.bytes.size());

@@ -38,6 +38,8 @@ class CodedSum {
     return points_ == 0 ? 0 : std::sqrt(std::max(forward_, backward_) / points_);
   }
   [[nodiscard]] TileErrors errors() const;
+  /// Colour error that the positions allow at least, about.
+  [[nodiscard]] double least_color_error() const { return points_ == 0 ? 0 : least_color_ / points_; }
   [[nodiscard]] double points() const { return points_; }
   [[nodiscard]] double bits_per_point() const { return 8 * bytes_ / points_; }
   [[nodiscard]] double geometry_bits_per_point() const { return 8 * geometry_bytes_ / points_; }
@@ -45,7 +47,8 @@ class CodedSum {
   [[nodiscard]] double surface_share() const { return points_ == 0 ? 0 : surface_points_ / points_; }
 
  private:
-  double points_ = 0, forward_ = 0, backward_ = 0, color_ = 0, density_ = 0, max_axis_ = 0, bytes_ = 0;
+  double points_ = 0, forward_ = 0, backward_ = 0, color_ = 0, least_color_ = 0, density_ = 0, max_axis_ = 0,
+         bytes_ = 0;
   double geometry_bytes_ = 0, surface_points_ = 0;
 };
 

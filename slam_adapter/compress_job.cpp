@@ -31,8 +31,12 @@ constexpr double kNearRms = 0.98;
 constexpr int kTriesForNear = 3;
 
 // Of the map's colour, in shares of its bound: where it shall lie, what is near enough, and the range of
-// losses.
-constexpr double kColorAim = 0.985, kNearColor = 0.96, kLeastLoss = 0.05, kMostLoss = 4, kAboveLeast = 1.2;
+// slopes.
+constexpr double kColorAim = 0.985, kNearColor = 0.96, kFirstSlope = 25, kLeastSlope = 0.1, kMostSlope = 4000;
+// How the error grows with the slope, and how far one guess may go.
+constexpr double kColorExponent = 0.22, kColorLeap = 2;
+// What nobody asked for shall not come nearer than this to the least error that positions allow.
+constexpr double kAboveLeast = 1.2;
 constexpr int kColorTries = 4;
 
 using Clock = std::chrono::steady_clock;
@@ -74,7 +78,7 @@ Result<CompressReport> CompressJob::run() {
   report_.search_seconds = lap(at);
   if (choice_.coded) searched_step_ = choice_.plan.step_m;
   if (const auto color = bounded_color(); color && !has_target() && choice_.plan.has_surfaces())
-    color_loss_ = 0.6 * schema_.channels[*color].bound;
+    color_slope_ = kFirstSlope * schema_.channels[*color].bound;
   MAPCODEC_TRY(encode_until_kept());
   report_.seconds = lap(begin);
   report_.threads = arena_.threads();
@@ -164,10 +168,13 @@ Status CompressJob::encode_until_kept() {
 bool CompressJob::is_kept_or_adjust() {
   if (has_target()) return meets_target_or_adjust();
   const auto color = bounded_color();
-  const bool colored = color_loss_ > 0 && color;
+  const bool colored = color_slope_ > 0 && color;
   const ColorState state = colored ? adjust_map_color(schema_.channels[*color].bound) : ColorState::met;
   if (state == ColorState::finer_positions) return false;
-  if (schema_.promise == PromiseKind::rms && !meets_rms_or_adjust()) return false;
+  if (schema_.promise == PromiseKind::rms && !meets_rms_or_adjust()) {
+    color_secant_.reset();  // other positions, other errors
+    return false;
+  }
   if (colored && choice_.plan.has_surfaces()) {
     color_tries_ += state == ColorState::missed;
     return state == ColorState::met;
@@ -214,26 +221,26 @@ bool CompressJob::meets_rms_or_adjust() {
   return false;
 }
 
-/// All surface tiles have one loss on top of what their positions cost: so bits go where they help most.
-/// Positions are made finer only where no loss is small enough and the bound was asked for.
+/// All surface tiles save their last bit at one price in error: so bits go where they help most. Positions
+/// are made finer only where no price is low enough and the bound was asked for.
 CompressJob::ColorState CompressJob::adjust_map_color(double asked_bound) {
-  // error^2 = floor^2 + loss * error, for the map as for a tile.
-  const double error = coded_.errors().color_error, floor2 = std::max(0.0, error * (error - color_loss_));
+  const double error = coded_.errors().color_error;
   // Coming near what is least takes many bits for little: nobody asked for that.
-  const double sensible = options_.color_error_asked ? 0 : kAboveLeast * std::sqrt(floor2);
+  const double sensible = options_.color_error_asked ? 0 : kAboveLeast * coded_.least_color_error();
   const double bound = std::max(asked_bound, sensible);
-  const double least = kLeastLoss * bound, most = kMostLoss * bound;
-  if (error > bound && color_loss_ <= least) {
+  const double least = kLeastSlope * bound, most = kMostSlope * bound;
+  if (error > bound && color_slope_ <= least) {
     if (!options_.color_error_asked) return ColorState::met;
     choice_.plan.step_m *= 0.8;
+    color_secant_.reset();
     ++color_tries_;
     return ColorState::finer_positions;
   }
-  if (error <= bound && (error >= kNearColor * bound || color_loss_ >= most || color_tries_ >= kColorTries))
+  if (error <= bound && (error >= kNearColor * bound || color_slope_ >= most || color_tries_ >= kColorTries))
     return ColorState::met;
-  const double aim = kColorAim * bound;
-  color_loss_ = std::clamp((aim * aim - floor2) / aim, least, most);
-  if (error > bound && color_tries_ > kColorTries) color_loss_ = least;
+  if (!color_secant_) color_secant_.emplace(kColorAim * bound, kColorExponent, kColorLeap);
+  color_slope_ = std::clamp(color_secant_->next(color_slope_, error), least, most);
+  if (error > bound && color_tries_ > kColorTries) color_slope_ = least;
   return ColorState::missed;
 }
 
@@ -306,7 +313,7 @@ Status CompressJob::encode_once() {
   report_.tile_seconds.clear();
   levels_->clear();
   schema_.step_m = choice_.plan.step_m;
-  choice_.plan.tiles.color_loss = color_loss_;
+  choice_.plan.tiles.color_slope = color_slope_;
   MapInfo info;
   info.schema = write_schema(schema_);
   info.origin = plan_.origin();

@@ -71,7 +71,8 @@ class CompressJob {
   double best_step_ = 0, best_bits_ = INFINITY;  // of the codings that kept the promise, the smallest
   std::optional<LogSecant> secant_;              // over the codings of the whole map
   int target_tries_ = 0, rms_tries_ = 0, color_tries_ = 0;
-  double color_loss_ = 0;    // of surface tiles, the same for all; 0: each meets the bound
+  std::optional<LogSecant> color_secant_;
+  double color_slope_ = 0;   // of surface tiles, the same for all; 0: each meets the bound
   double color_target_ = 1;  // share of the colour bound that tiles aim at
   CompressReport report_;
 };

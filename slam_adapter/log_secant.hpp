@@ -11,8 +11,10 @@ namespace mapcodec {
 /// what is known.
 class LogSecant {
  public:
-  /// @param slope  first guess of d log(value) / d log(step).
-  LogSecant(double target, double slope) : target_(std::log(target)), slope_(slope) {}
+  /// @param slope  first guess of d log(value) / d log(step). @param longest_leap  of log(step): what is far
+  /// away is not as the slope here says.
+  LogSecant(double target, double slope, double longest_leap = 1.1)
+      : target_(std::log(target)), slope_(slope), longest_leap_(longest_leap) {}
 
   /// @return the next step to try.
   double next(double step, double value) {
@@ -27,7 +29,7 @@ class LogSecant {
     last_x_ = x;
     last_y_ = y;
     has_last_ = true;
-    double to = x + std::clamp((target_ - y) / slope_, -kLongestLeap, kLongestLeap);
+    double to = x + std::clamp((target_ - y) / slope_, -longest_leap_, longest_leap_);
     const bool bracketed = std::isfinite(low_) && std::isfinite(high_);
     if (bracketed && (to <= low_ || to >= high_)) to = (low_ + high_) / 2;
     return std::exp(to);
@@ -37,10 +39,7 @@ class LogSecant {
   [[nodiscard]] bool is_leap() const { return high_ - low_ < 0.02; }
 
  private:
-  // What is far away is not as the slope here says.
-  static constexpr double kLongestLeap = 1.1;
-
-  double target_, slope_;
+  double target_, slope_, longest_leap_;
   double last_x_ = 0, last_y_ = 0;
   bool has_last_ = false;
   double low_ = -INFINITY, high_ = INFINITY;

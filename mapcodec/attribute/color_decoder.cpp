@@ -39,8 +39,10 @@ Result<Head> read_head(ByteReader& in, const ChannelInfo& info) {
   MAPCODEC_TRY(in.status("colour"));
   h.settings.split_cells = (flags & 1) != 0;
   h.settings.scale = (flags & 2) != 0 ? ColorScale::sixteen : ColorScale::eight;
+  h.settings.coarse = (flags & 4) != 0;
   const bool bad_scale = (flags & 2) != 0 && info.scalar == ScalarType::u8;
-  if (flags > 3 || bad_scale || step == 0 || step >= (1u << 24)) {
+  const bool bad_coarse = h.settings.coarse && h.settings.split_cells;
+  if (flags > 7 || bad_scale || bad_coarse || step == 0 || step >= (1u << 24)) {
     return make_error(ErrorCode::kMalformed, "broken colour head", in.offset());
   }
   h.settings.step = static_cast<std::uint32_t>(step);

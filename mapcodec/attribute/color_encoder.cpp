@@ -61,6 +61,7 @@ class WritePolicy {
   [[nodiscard]] ColorPoint mean(std::uint32_t begin, std::uint32_t end) const {
     return originals_.mean(begin, end);
   }
+  void enter_split(std::uint32_t, std::uint32_t, std::uint32_t) {}
   [[nodiscard]] bool ok() const { return true; }
 
   std::array<std::int64_t, 3> code(const SplitContext& context, const ColorPoint& wanted,
@@ -218,12 +219,7 @@ class ColorEncoder::Search {
     e.decoded = code(&side, deepest);
     e.error = error_of(e.decoded);
     ByteWriter out;
-    out.u8(kColorSection);
-    out.u8(static_cast<std::uint8_t>((settings_.split_cells ? 1 : 0) |
-                                     (settings_.scale == ColorScale::sixteen ? 2 : 0)));
-    out.varint(settings_.step);
-    out.u8(static_cast<std::uint8_t>(settings_.levels));
-    for (const std::int64_t c : head_) out.signed_varint(c);
+    write_color_head(out, settings_, head_);
     out.raw(side.finish());
     e.bytes = out.take();
     return e;
@@ -238,9 +234,17 @@ class ColorEncoder::Search {
   std::map<std::uint32_t, Try> tries_;  ///< by their step
 };
 
-namespace {
+void write_color_head(ByteWriter& out, const ColorSettings& settings, const ColorPoint& root) {
+  out.u8(kColorSection);
+  out.u8(static_cast<std::uint8_t>((settings.split_cells ? 1 : 0) |
+                                   (settings.scale == ColorScale::sixteen ? 2 : 0) |
+                                   (settings.coarse ? 4 : 0)));
+  out.varint(settings.step);
+  out.u8(static_cast<std::uint8_t>(settings.levels));
+  for (const std::int64_t c : root) out.signed_varint(c);
+}
 
-ColorScale scale_of(const Channel& values) {
+ColorScale color_scale_of(const Channel& values) {
   if (values.info.scalar == ScalarType::u8) return ColorScale::eight;
   for (std::size_t i = 0; i < values.size(); ++i) {
     const auto v = load_rgb(values, i);
@@ -249,15 +253,13 @@ ColorScale scale_of(const Channel& values) {
   return ColorScale::eight;
 }
 
-}  // namespace
-
 ChannelEncoding encode_color(const Channel& values, double bound, std::span<const VoxelCoord> voxels,
                              Effort effort) {
   return ColorEncoder(values, voxels).encode(bound, effort);
 }
 
 ColorEncoder::ColorEncoder(const Channel& values, std::span<const VoxelCoord> voxels)
-    : search_(std::make_unique<Search>(values, scale_of(values), voxels)) {}
+    : search_(std::make_unique<Search>(values, color_scale_of(values), voxels)) {}
 
 ColorEncoder::~ColorEncoder() = default;
 

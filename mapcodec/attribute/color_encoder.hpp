@@ -4,6 +4,8 @@
 #include <memory>
 
 #include "mapcodec/attribute/channel_encoder.hpp"
+#include "mapcodec/attribute/color_walk.hpp"
+#include "mapcodec/base/byte_writer.hpp"
 
 namespace mapcodec {
 
@@ -13,6 +15,12 @@ namespace mapcodec {
 /// @param voxels  Morton-sorted, coordinates below 2^21. Threads: pure.
 [[nodiscard]] ChannelEncoding encode_color(const Channel& values, double bound,
                                            std::span<const VoxelCoord> voxels, Effort effort);
+
+/// How the numbers of a colour channel are scaled.
+[[nodiscard]] ColorScale color_scale_of(const Channel& values);
+
+/// The fields before the symbols. @param root  mean of all points, in 1/16 level.
+void write_color_head(ByteWriter& out, const ColorSettings& settings, const ColorPoint& root);
 
 /// encode_color for one cloud and several bounds: what does not depend on the bound is worked out once.
 /// Threads: one at a time.

@@ -20,6 +20,8 @@ struct ColorSettings {
   std::uint32_t levels = 0;  ///< levels whose splits are coded; deeper ones are only predicted
   bool split_cells = false;  ///< points that share a finest cell get values of their own
   ColorScale scale = ColorScale::eight;
+  bool coarse =
+      false;  ///< for steps so wide that most splits have no symbols: what is predicted counts in contexts
 };
 
 /// What is known of a split before its symbols.
@@ -27,6 +29,11 @@ struct SplitContext {
   std::uint32_t gain = 0;    ///< binary logarithm of v w / (v + w), 0..15
   std::uint32_t around = 0;  ///< symbols of the cells around, 0..5
   std::uint32_t above = 0;   ///< symbols of the cell above, 0..3
+  // Coarse settings only:
+  bool coarse = false;
+  std::uint32_t busy = 0;                   ///< symbols of all these and of the cell itself so far, 0..11
+  std::array<std::uint32_t, 3> expected{};  ///< size of the predicted difference to a step, 0..7
+  std::array<bool, 3> expected_negative{};
 };
 
 /// v w / (v + w) in 1/65536.
@@ -56,7 +63,8 @@ struct SplitContext {
 
 /// Policy: `std::array<std::int64_t, 3> code(const SplitContext&, const ColorPoint& wanted, const ColorPoint&
 /// steps)` gives the quantised differences; `wanted` (difference less prediction) means something only if
-/// Policy::kKnows, and then `truth(level)` gives the sums of the original values of the level's cells.
+/// Policy::kKnows, and then `sum(node)` gives the sums of the original values of the level's cells, and
+/// `enter_split(begin, middle, end)` tells which points are split.
 template <class Policy>
 class ColorWalk {
  public:
@@ -104,6 +112,7 @@ class ColorWalk {
     std::array<ColorPoint, 16> predicted;  ///< weighted sums
     std::array<ColorPoint, 16> truth;      ///< sums of the originals
     std::array<ColorPoint, 16> mean;
+    std::array<std::uint32_t, 16> begin{}, end{};  ///< points
   };
 
   void descend(std::size_t l) {
@@ -157,7 +166,11 @@ class ColorWalk {
       const ColorPoint p = predict(level, n, octant);
       groups_.weight[8 + octant] = weight;
       for (std::size_t c = 0; c < 3; ++c) groups_.predicted[8 + octant][c] = p[c] * weight;
-      if constexpr (Policy::kKnows) groups_.truth[8 + octant] = policy_.sum(at);
+      if constexpr (Policy::kKnows) {
+        groups_.truth[8 + octant] = policy_.sum(at);
+        groups_.begin[8 + octant] = below.nodes[at].begin;
+        groups_.end[8 + octant] = below.nodes[at + 1].begin;
+      }
       ++at;
     }
     for (std::size_t g = 7; g >= 1; --g) join_groups(g);
@@ -169,8 +182,16 @@ class ColorWalk {
     if (groups_.weight[a] == 0 || groups_.weight[b] == 0) {
       const std::size_t only = groups_.weight[a] == 0 ? b : a;
       groups_.predicted[g] = groups_.predicted[only];
-      if constexpr (Policy::kKnows) groups_.truth[g] = groups_.truth[only];
+      if constexpr (Policy::kKnows) {
+        groups_.truth[g] = groups_.truth[only];
+        groups_.begin[g] = groups_.begin[only];
+        groups_.end[g] = groups_.end[only];
+      }
       return;
+    }
+    if constexpr (Policy::kKnows) {
+      groups_.begin[g] = groups_.begin[a];
+      groups_.end[g] = groups_.end[b];
     }
     for (std::size_t c = 0; c < 3; ++c) {
       groups_.predicted[g][c] = groups_.predicted[a][c] + groups_.predicted[b][c];
@@ -182,9 +203,10 @@ class ColorWalk {
   /// there if it is decoded already, else the whole cell.
   [[nodiscard]] ColorPoint predict(const ColorLevel& level, std::uint32_t n, std::uint32_t octant) const {
     const ColorNode& node = level.nodes[n];
-    std::int64_t weight = kOwnWeight;
+    const std::int64_t own = settings_.coarse ? kOwnWeightOfCoarse : kOwnWeight;
+    std::int64_t weight = own;
     ColorPoint sum{};
-    for (std::size_t c = 0; c < 3; ++c) sum[c] = means_[n][c] * kOwnWeight;
+    for (std::size_t c = 0; c < 3; ++c) sum[c] = means_[n][c] * own;
     for (std::uint32_t axis = 0; axis < 3; ++axis) {
       const std::uint32_t face = node.faces[2 * axis + ((octant >> axis) & 1)];
       if (face == kNoNode) continue;
@@ -210,6 +232,8 @@ class ColorWalk {
     context_.around = std::min<std::uint32_t>(static_cast<std::uint32_t>(std::bit_width(around)), 5);
     context_.above =
         std::min<std::uint32_t>(static_cast<std::uint32_t>(std::bit_width(std::uint32_t{activity_[n]})), 3);
+    context_.coarse = settings_.coarse;
+    busy_ = 2 * around + 3 * std::uint32_t{activity_[n]};
   }
 
   void split_group(std::size_t g) {
@@ -228,6 +252,7 @@ class ColorWalk {
                     predicted[c];
       }
     }
+    if constexpr (Policy::kKnows) policy_.enter_split(groups_.begin[a], groups_.begin[b], groups_.end[b]);
     std::tie(groups_.mean[a], groups_.mean[b]) = split(groups_.mean[g], v, w, predicted, wanted, coded_);
   }
 
@@ -266,6 +291,7 @@ class ColorWalk {
   void add_coded(ColorPoint& d, const SplitScale& scale, const ColorPoint& wanted) {
     context_.gain = scale.gain;
     const ColorPoint& steps = scale.steps;
+    if (settings_.coarse) expect(d, steps);
     const std::array<std::int64_t, 3> q = policy_.code(context_, wanted, steps);
     for (std::size_t c = 0; c < 3; ++c) {
       d[c] = std::clamp(d[c] + q[c] * steps[c], -kMostDifference, kMostDifference);
@@ -273,8 +299,18 @@ class ColorWalk {
     }
   }
 
+  void expect(const ColorPoint& d, const ColorPoint& steps) {
+    context_.busy = std::min(11u, static_cast<std::uint32_t>(std::bit_width(busy_ + 4 * symbols_)));
+    for (std::size_t c = 0; c < 3; ++c) {
+      const auto size = static_cast<std::uint64_t>(d[c] < 0 ? -d[c] : d[c]);
+      context_.expected[c] = std::min(
+          7u, static_cast<std::uint32_t>(std::bit_width(16 * size / static_cast<std::uint64_t>(steps[c]))));
+      context_.expected_negative[c] = d[c] < 0;
+    }
+  }
+
   static constexpr std::size_t kSmall = 16;
-  static constexpr std::int64_t kOwnWeight = 4, kFaceWeight = 2, kChildWeight = 3;
+  static constexpr std::int64_t kOwnWeight = 4, kOwnWeightOfCoarse = 8, kFaceWeight = 2, kChildWeight = 3;
   static constexpr std::array<std::int64_t, 32> kReciprocal = [] {
     std::array<std::int64_t, 32> r{};
     for (std::size_t i = 1; i < 32; ++i)
@@ -294,7 +330,7 @@ class ColorWalk {
   std::vector<std::uint8_t> activity_, next_activity_, node_activity_;
   Groups groups_;
   SplitContext context_;
-  std::uint32_t symbols_ = 0;
+  std::uint32_t symbols_ = 0, busy_ = 0;
   bool coded_ = true;
 };
 

@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "mapcodec/attribute/channel_encoder.hpp"
+#include "mapcodec/codec/surface_color.hpp"
 #include "mapcodec/codec/surface_encoder.hpp"
-#include "mapcodec/codec/surface_transfer.hpp"
 #include "mapcodec/codec/tile_sections.hpp"
 #include "mapcodec/quality/density.hpp"
 #include "mapcodec/quality/grid_nearest.hpp"
@@ -62,12 +62,12 @@ Channel on_decoded(const ChannelSchema& channel, const Channel& original, const 
 class TileChannels {
  public:
   TileChannels(const PointCloud& tile, const MapSchema& schema, const NearestPair& near, Effort effort,
-               double color_loss)
+               double color_slope)
       : tile_(tile),
         schema_(schema),
         near_(near),
         effort_(effort),
-        color_loss_(color_loss),
+        color_slope_(color_slope),
         coded_(coded_channels(schema, CodecId::surface)) {}
 
   /// Colour first: it decides on the voxels.
@@ -84,9 +84,10 @@ class TileChannels {
       const std::size_t c = coded_[color];
       MAPCODEC_ASSIGN(SurfaceColor e,
                       encode_surface_color(schema_.channels[c], tile_.channels[c], near_,
-                                           SamePositions(tile_.xyz), encoding, effort_, color_loss_));
+                                           SamePositions(tile_.xyz), encoding, effort_, color_slope_));
       r.channels[color] = std::move(e.bytes);
       r.errors.color_error = e.error;
+      r.least_color_error = e.least_error;
       shift = e.voxel_shift;
     }
     const surface::VoxelOrder sorted = set_voxels(encoding, shift);
@@ -113,7 +114,7 @@ class TileChannels {
   const MapSchema& schema_;
   const NearestPair& near_;
   Effort effort_;
-  double color_loss_;
+  double color_slope_;
   std::vector<std::size_t> coded_;
 };
 
@@ -131,7 +132,7 @@ Result<SurfaceTile> encode_surface_tile(const PointCloud& tile, const MapSchema&
   } else {
     const NearestPair near = find_nearest_pair(tile.xyz, e.decoded);
     measure(tile.xyz, e.decoded, near, r);
-    MAPCODEC_TRY(TileChannels(tile, schema, near, settings.effort, settings.color_loss).encode(e, r));
+    MAPCODEC_TRY(TileChannels(tile, schema, near, settings.effort, settings.color_slope).encode(e, r));
   }
   r.geometry = std::move(e.bytes);
   return r;

@@ -4,9 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
-#include <optional>
 
-#include "mapcodec/attribute/color_encoder.hpp"
 #include "mapcodec/attribute/color_space.hpp"
 
 namespace mapcodec {
@@ -40,123 +38,6 @@ Channel gather(const Channel& from, std::span<const std::uint32_t> order) {
   for (std::size_t i = 0; i < order.size(); ++i) std::memcpy(to.at(i), from.at(order[i]), from.info.stride());
   return to;
 }
-
-/// Undoes gather.
-Channel scatter(const Channel& from, std::span<const std::uint32_t> order) {
-  Channel to{from.info, Bytes(order.size() * from.info.stride())};
-  for (std::size_t i = 0; i < order.size(); ++i) std::memcpy(to.at(order[i]), from.at(i), from.info.stride());
-  return to;
-}
-
-/// All points of a voxel get their mean colour.
-Channel merge_voxels(const Channel& values, std::span<const VoxelCoord> voxels) {
-  Channel merged{values.info, Bytes(values.data.size())};
-  for (std::size_t begin = 0, end = 0; begin < voxels.size(); begin = end) {
-    Rgb sum{};
-    for (end = begin; end < voxels.size() && voxels[end] == voxels[begin]; ++end)
-      add(sum, load_rgb(values, end));
-    for (std::size_t i = begin; i < end; ++i) store(merged, i, sum, static_cast<std::int64_t>(end - begin));
-  }
-  return merged;
-}
-
-/// Colours on voxels of one size.
-struct OnVoxels {
-  std::uint8_t shift;
-  surface::VoxelOrder sorted;
-  Channel merged;  ///< in voxel order
-  double floor;    ///< measured error of `merged`
-};
-
-class ColorControl {
- public:
-  ColorControl(const ChannelSchema& channel, const Channel& original, const NearestPair& near,
-               const SamePositions& ties, const SurfaceEncoding& encoding, Effort effort, double loss)
-      : channel_(channel),
-        loss_(loss),
-        original_(original),
-        near_(near),
-        encoding_(encoding),
-        effort_(effort),
-        ties_(ties),
-        values_(transfer_color(original, near, ties)) {}
-
-  Result<SurfaceColor> run() {
-    const OnVoxels finest = on_voxels(surface::least_voxel_shift(encoding_.header.depth));
-    const double bound = loss_ > 0 ? (loss_ + std::hypot(loss_, 2 * finest.floor)) / 2
-                                   : std::max(channel_.bound, kAboveFloor * finest.floor);
-    const OnVoxels coarse = coarsest(bound * kFloorShare, finest);
-    MAPCODEC_ASSIGN(SurfaceColor best, encode(coarse, bound));
-    if (effort_ == Effort::fast) return best;
-    // Rough colours leave more to code on coarse voxels than those save.
-    for (std::uint8_t shift = coarse.shift; shift > finest.shift;) {
-      MAPCODEC_ASSIGN(SurfaceColor finer, encode(on_voxels(--shift), bound));
-      if (!is_better(finer, best, bound)) break;
-      best = std::move(finer);
-    }
-    return best;
-  }
-
- private:
-  // What is left of the bound for coding when voxels are as coarse as they may be; found by measuring sizes.
-  static constexpr double kFloorShare = 0.95, kAboveFloor = 1.05;
-  static constexpr int kTries = 4;
-
-  static bool is_better(const SurfaceColor& a, const SurfaceColor& b, double bound) {
-    if ((a.error <= bound) != (b.error <= bound)) return a.error <= bound;
-    return a.error <= bound ? a.bytes.size() < b.bytes.size() : a.error < b.error;
-  }
-
-  [[nodiscard]] OnVoxels on_voxels(std::uint8_t shift) const {
-    OnVoxels r{shift, surface::order_by_voxels(encoding_.points, encoding_.header.depth, shift), {}, 0};
-    r.merged = merge_voxels(gather(values_, r.sorted.order), r.sorted.voxels);
-    r.floor = color_error_between(original_, scatter(r.merged, r.sorted.order), near_, ties_);
-    return r;
-  }
-
-  /// The coarsest voxels whose floor is at most `most`, by bisection; or the finest.
-  OnVoxels coarsest(double most, const OnVoxels& finest) const {
-    OnVoxels best = finest;
-    unsigned high = surface::most_voxel_shift(encoding_.header.depth) + 1u;
-    while (best.shift + 1u < high) {
-      OnVoxels trial = on_voxels(static_cast<std::uint8_t>((best.shift + high) / 2));
-      if (trial.floor <= most) {
-        best = std::move(trial);
-      } else {
-        high = trial.shift;
-      }
-    }
-    return best;
-  }
-
-  Result<SurfaceColor> encode(const OnVoxels& on, double bound) const {
-    // The loss of merging and that of coding add up about as independent errors do.
-    const double share = on.floor / bound;
-    double target = bound * std::max(0.1, std::sqrt(std::max(0.0, 1 - share * share)));
-    ColorEncoder encoder(on.merged, on.sorted.voxels);
-    std::optional<SurfaceColor> best;
-    for (int i = 0; i < kTries; ++i) {
-      ChannelEncoding e = encoder.encode(target, effort_);
-      const double error = color_error_between(original_, scatter(e.decoded, on.sorted.order), near_, ties_);
-      SurfaceColor found{std::move(e.bytes), on.shift, error};
-      if (!best || is_better(found, *best, bound)) best = std::move(found);
-      if (error <= bound && error > 0.98 * bound) break;
-      const double over = error * error - on.floor * on.floor,
-                   wanted = 0.98 * bound * bound - on.floor * on.floor;
-      target *= over > 0 && wanted > 0 ? std::clamp(std::sqrt(wanted / over), 0.3, 2.0) : 0.5;
-    }
-    return std::move(*best);
-  }
-
-  const ChannelSchema& channel_;
-  const double loss_;
-  const Channel& original_;
-  const NearestPair& near_;
-  const SurfaceEncoding& encoding_;
-  Effort effort_;
-  const SamePositions& ties_;
-  Channel values_;
-};
 
 }  // namespace
 
@@ -218,12 +99,6 @@ double color_error_between(const Channel& original, const Channel& decoded, cons
   return (forth / static_cast<double>(near.forth.index.size()) +
           back / static_cast<double>(near.back.index.size())) /
          (2 * scale);
-}
-
-Result<SurfaceColor> encode_surface_color(const ChannelSchema& channel, const Channel& original,
-                                          const NearestPair& near, const SamePositions& ties,
-                                          const SurfaceEncoding& encoding, Effort effort, double loss) {
-  return ColorControl(channel, original, near, ties, encoding, effort, loss).run();
 }
 
 }  // namespace mapcodec

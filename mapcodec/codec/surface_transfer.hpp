@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Channels of the original points to resampled ones, and colour within its bound there. Encoder only.
+// Channels of the original points to resampled ones. Encoder only.
 #pragma once
 
-#include "mapcodec/attribute/channel_encoder.hpp"
-#include "mapcodec/codec/surface_encoder.hpp"
+#include "mapcodec/cloud/channel.hpp"
 #include "mapcodec/quality/grid_nearest.hpp"
 
 namespace mapcodec {
@@ -34,24 +33,5 @@ class SamePositions {
 /// Mean RGB distance (0..255) between nearest neighbours, mean of both directions: what `evaluate` measures.
 [[nodiscard]] double color_error_between(const Channel& original, const Channel& decoded,
                                          const NearestPair& near, const SamePositions& ties);
-
-struct SurfaceColor {
-  Bytes bytes;               ///< a channel's section
-  std::uint8_t voxel_shift;  ///< that it was coded on
-  double error = 0;          ///< as color_error_between
-};
-
-/// Codes colour so that its error as measured stays within channel.bound, in few bits: on voxels as coarse as
-/// the bound allows, all points of one alike. If no colours on these positions meet the bound, a little above
-/// the least error.
-/// @param encoding  for its points; unchanged. @param near  of originals and encoding.decoded.
-/// @param loss  > 0: not the bound is the aim but the error D = (loss + sqrt(loss^2 + 4 least^2)) / 2, with
-/// the least error of these positions: D^2 = least^2 + x^2 is what a loss x of coding gives, and where bits
-/// fall with log x, x^2 = loss * D is where all tiles have one slope of bits against error. So rough tiles
-/// may be worse than the bound and smooth ones better, and the map takes fewer bits for the same mean.
-[[nodiscard]] Result<SurfaceColor> encode_surface_color(const ChannelSchema& channel, const Channel& original,
-                                                        const NearestPair& near, const SamePositions& ties,
-                                                        const SurfaceEncoding& encoding, Effort effort,
-                                                        double loss = 0);
 
 }  // namespace mapcodec

@@ -57,9 +57,9 @@ struct TileSettings {
   Effort effort = Effort::standard;
   bool keep_counts = true;  ///< points: voxels keep how many points they stood for
   double step_m = 0;        ///< points, surface: this tile's own step (written into it); 0: schema.step_m
-  /// surface: > 0: bounded colour is not coded to its bound but with this loss on top of the least error that
-  /// the tile's positions allow (see encode_surface_color). The map's bound is then the caller's to keep.
-  double color_loss = 0;
+  /// surface: > 0: bounded colour is not coded to its bound but so that the last bit saves this much error
+  /// (see encode_surface_color). The map's bound is then the caller's to keep.
+  double color_slope = 0;
   /// points, surface: for searches. Where no channel is coded, the RMS is measured on a part of the points
   /// (within about 1 %), and neither the largest nor the density error is.
   bool rough_errors = false;
@@ -82,8 +82,9 @@ struct EncodedTile {
   std::uint64_t geometry_bytes = 0;  ///< of `bytes`, what is not channels
   Box bounds;                        ///< of the decoded points and the original ones
   TileErrors errors;
-  double rms_forward_m = 0;   ///< root mean square distance of the original points to the decoded ones
-  double rms_backward_m = 0;  ///< of the decoded points to the original ones
+  double rms_forward_m = 0;      ///< root mean square distance of the original points to the decoded ones
+  double rms_backward_m = 0;     ///< of the decoded points to the original ones
+  double least_color_error = 0;  ///< surface: what colours on these positions lose at least, about
 };
 
 /// Encodes the points of one tile. Pure: same input, same bytes, on any thread.

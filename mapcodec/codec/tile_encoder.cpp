@@ -141,6 +141,7 @@ Result<EncodedTile> encode_by_surfaces(const PointCloud& tile, const MapSchema& 
   r.errors = t.errors;
   r.rms_forward_m = t.rms_forward_m;
   r.rms_backward_m = t.rms_backward_m;
+  r.least_color_error = t.least_color_error;
   r.bytes = out.take();
   return r;
 }

@@ -171,6 +171,7 @@ CLOUDS = {
     "surface_coarse": ("a.pcd", dense_room, "--rms 0.03 --codec surface"),
     "surface_noisy": ("a.pcd", noisy_room, "--rms 0.06 --codec surface --effort high"),
     "surface_colors": ("a.pcd", colored_room, "--rms 0.05 --codec surface --color-error 12"),
+    "surface_coarse_colors": ("a.pcd", colored_room, "--rms 0.05 --codec surface --color-error 20"),
     "surface_tiles": ("a.pcd", colored_room, "--rms 0.05 --codec surface --channels none --tile-size 2"),
     "surface_utm": ("a.pcd", utm_room, "--rms 0.05 --codec surface"),
     "surface_pile": ("a.pcd", pile, "--rms 0.05 --codec surface"),

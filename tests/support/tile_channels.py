@@ -315,8 +315,9 @@ def build_tree(voxels):
 
 
 class Colors:
-    def __init__(self, d, step):
-        self.d = d
+    def __init__(self, d, step, coarse):
+        self.d, self.coarse = d, coarse
+        self.any_coarse, self.against = Models(), Models()
         self.steps = [step * length * 256 for length in (443, 362, 627)]
         self.any, self.zero, self.magnitude = Models(), Models(), Models(MagnitudeModel)
         self.symbols = 0
@@ -340,6 +341,7 @@ class Colors:
         around += sum(other.activity for other in (across(a, -1) for a in range(3)) if other)
         self.around = min(5, around.bit_length())
         self.above = min(3, cell.above.bit_length())
+        self.busy = 2 * around + 3 * cell.above
         self.symbols = 0
         weights, sums, means = [0] * 16, [[0, 0, 0] for _ in range(16)], [None] * 16
         for octant, child in cell.children.items():
@@ -362,7 +364,8 @@ class Colors:
             child.mean, child.above = means[8 + octant], cell.activity
 
     def predict(self, cell, octant, across):
-        total, weight = [4 * m for m in cell.mean], 4
+        weight = 8 if self.coarse else 4
+        total = [weight * m for m in cell.mean]
         for axis in range(3):
             other = across(axis, 1 if octant >> axis & 1 else -1)
             if other is None:
@@ -377,8 +380,11 @@ class Colors:
         if coded:
             gain = (v * w // (v + w) << 16) + ((v * w % (v + w) << 16) // (v + w))
             root = math.isqrt(gain)
+            steps = [step // root + 1 for step in self.steps]
+            self.expected = [min(7, (16 * abs(x) // t).bit_length()) for x, t in zip(d, steps)]
+            self.falls = [x < 0 for x in d]
             for c, q in enumerate(self.read_symbols(clamp(gain.bit_length() - 16, 0, 15))):
-                d[c] = clamp(d[c] + q * (self.steps[c] // root + 1), -(1 << 24), 1 << 24)
+                d[c] = clamp(d[c] + q * steps[c], -(1 << 24), 1 << 24)
                 self.symbols += min(abs(q), 15) * (2 if c == 0 else 1)
         share = (w << 16) // (v + w)
         low = [m - (x * share >> 16) for m, x in zip(mean, d)]
@@ -386,14 +392,19 @@ class Colors:
 
     def read_symbols(self, gain):
         out = [0, 0, 0]
-        if not self.d.bit(self.any[gain, self.around, self.above]):
+        busy = min(11, (self.busy + 4 * self.symbols).bit_length()) if self.coarse else 0
+        any_model = self.any_coarse[gain, busy, self.expected[0]] if self.coarse else self.any[gain, self.around, self.above]
+        if not self.d.bit(any_model):
             return out
         before = 0
         for c in range(3):
             known = c == 2 and before == 0
             if not known and self.d.bit(self.zero[c, self.around, before]):
                 continue
-            negative = self.d.raw(1)
+            if self.coarse:
+                negative = self.d.bit(self.against[c, self.expected[c]]) != self.falls[c]
+            else:
+                negative = self.d.raw(1)
             q = (self.magnitude[c, self.around].decode(self.d) & 0xFFFFFF) + 1
             out[c] = -q if negative else q
             before |= 1 << min(c, 1)
@@ -413,9 +424,9 @@ class Colors:
 def read_colors(r, channel, voxels):
     flags, step, coded_levels = r.uint(1), r.varint(), r.uint(1)
     root = [256 * r.signed() for _ in range(3)]
-    if flags > 3 or step == 0:
+    if flags > 7 or flags & 5 == 5 or step == 0:
         raise Damaged("a broken colour head")
-    colors, levels = Colors(RangeDecoder(r.raw(r.left())), step), build_tree(voxels)
+    colors, levels = Colors(RangeDecoder(r.raw(r.left())), step, bool(flags & 4)), build_tree(voxels)
     levels[0][0].mean = root
     colors.walk(levels, coded_levels)
     means = [None] * len(voxels)

@@ -1,0 +1,277 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "mapcodec/codec/surface_color.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <optional>
+
+#include "mapcodec/attribute/coarse_color.hpp"
+#include "mapcodec/attribute/color_encoder.hpp"
+
+namespace mapcodec {
+namespace {
+
+using Rgb = std::array<float, 3>;
+
+// Found by measuring sizes at equal error: what a bit costs, in shares of what a step costs; how near to the
+// median distances are all alike; how much of the bound merging points into voxels may take.
+constexpr double kPrice = 0.24, kAlike = 0.7, kFloorShare = 0.45, kLeastFloor = 1.03;
+constexpr double kAboveLeast = 1.05;
+constexpr int kMedianRounds = 6;
+
+float distance(const Rgb& a, const Rgb& b) {
+  const float x = a[0] - b[0], y = a[1] - b[1], z = a[2] - b[2];
+  return std::sqrt(x * x + y * y + z * z);
+}
+
+/// An original colour that a decoded point is compared with.
+struct Sample {
+  Rgb rgb;
+  float weight;
+};
+
+/// The comparisons of each decoded point: by the originals whose nearest it is, and by its own nearest
+/// original.
+class Comparisons {
+ public:
+  Comparisons(const Channel& original, ColorScale scale, const NearestPair& near, const SamePositions& ties)
+      : begin_(near.back.index.size() + 1) {
+    const std::size_t n = near.back.index.size();
+    for (const std::uint32_t j : near.forth.index) ++begin_[j + 1];
+    for (std::size_t j = 0; j < n; ++j)
+      begin_[j + 1] += begin_[j] + static_cast<std::uint32_t>(ties.of(near.back.index[j]).size());
+    samples_.resize(begin_[n]);
+    std::vector<std::uint32_t> next(begin_.begin(), begin_.end() - 1);
+    const double forth = static_cast<double>(n) / static_cast<double>(near.forth.index.size());
+    for (std::size_t i = 0; i < near.forth.index.size(); ++i)
+      samples_[next[near.forth.index[i]]++] = {load(original, i, scale), static_cast<float>(forth)};
+    for (std::size_t j = 0; j < n; ++j) {
+      const auto same = ties.of(near.back.index[j]);
+      for (const std::uint32_t i : same)
+        samples_[next[j]++] = {load(original, i, scale), 1.0f / static_cast<float>(same.size())};
+    }
+  }
+  [[nodiscard]] std::span<const Sample> of(std::uint32_t j) const {
+    return std::span(samples_).subspan(begin_[j], begin_[j + 1] - begin_[j]);
+  }
+
+ private:
+  static Rgb load(const Channel& c, std::size_t i, ColorScale scale) {
+    const auto v = load_rgb(c, i);
+    const float unit = scale == ColorScale::sixteen ? 1.0f / 257 : 1.0f;
+    return {static_cast<float>(v[0]) * unit, static_cast<float>(v[1]) * unit,
+            static_cast<float>(v[2]) * unit};
+  }
+  std::vector<std::uint32_t> begin_;
+  std::vector<Sample> samples_;
+};
+
+/// Mean of samples, each weighted by the reciprocal distance to `center`, which is at least `alike`.
+Rgb mean_around(std::span<const Sample> samples, const Rgb& center, float alike, float& weight) {
+  Rgb sum{};
+  weight = 0;
+  for (const Sample& s : samples) {
+    const float w = s.weight / std::max(alike, distance(s.rgb, center));
+    weight += w;
+    for (std::size_t c = 0; c < 3; ++c) sum[c] += w * s.rgb[c];
+  }
+  for (float& c : sum) c /= weight;
+  return sum;
+}
+
+Rgb median_of(std::span<const Sample> samples) {
+  float weight = 0;
+  Rgb m = mean_around(samples, {}, 1e6f, weight);
+  for (int i = 0; i < kMedianRounds && samples.size() > 1; ++i) m = mean_around(samples, m, 1, weight);
+  return m;
+}
+
+/// Decoded points on voxels of one size.
+struct OnVoxels {
+  std::uint8_t shift;
+  surface::VoxelOrder sorted;
+  std::vector<std::uint32_t> begin;  ///< of each voxel's points in `sorted`, and the end of all
+  ColorAims aims;                    ///< medians
+  double floor;                      ///< error if these were kept exactly
+};
+
+class ColorSearch {
+ public:
+  ColorSearch(const ChannelSchema& channel, const Channel& original, const NearestPair& near,
+              const SamePositions& ties, const SurfaceEncoding& encoding, Effort effort)
+      : channel_(channel),
+        original_(original),
+        near_(near),
+        ties_(ties),
+        encoding_(encoding),
+        passes_(effort == Effort::fast       ? 2
+                : effort == Effort::standard ? 3
+                                             : 4),
+        scale_(color_scale_of(original)),
+        comparisons_(original, scale_, near, ties) {}
+
+  Result<SurfaceColor> run(double slope) {
+    OnVoxels on = on_voxels(surface::least_voxel_shift(encoding_.header.depth));
+    const double least = on.floor;
+    const double bound = slope > 0 ? channel_.bound : std::max(channel_.bound, kAboveLeast * least);
+    on = coarsest(std::max(kFloorShare * bound, kLeastFloor * least), std::move(on));
+    encoder_.emplace(on.sorted.voxels, original_.info, scale_);
+    usual_ = std::max(bound, 1.0);
+    SurfaceColor best = slope > 0 ? code_at(on, slope) : code_within(on, bound);
+    best.least_error = least;
+    return best;
+  }
+
+ private:
+  [[nodiscard]] OnVoxels on_voxels(std::uint8_t shift) const {
+    OnVoxels r{shift, surface::order_by_voxels(encoding_.points, encoding_.header.depth, shift), {}, {}, 0};
+    const std::vector<VoxelCoord>& voxels = r.sorted.voxels;
+    for (std::uint32_t i = 0; i < voxels.size(); ++i) {
+      if (i == 0 || voxels[i] != voxels[i - 1]) r.begin.push_back(i);
+    }
+    r.begin.push_back(static_cast<std::uint32_t>(voxels.size()));
+    r.aims.weights.assign(voxels.size(), 1);
+    r.aims.rgb.resize(voxels.size());
+    for_each_voxel(r, [&](std::uint32_t begin, std::uint32_t end, std::span<const Sample> samples) {
+      std::fill(r.aims.rgb.begin() + begin, r.aims.rgb.begin() + end, median_of(samples));
+    });
+    r.floor = error_of(decoded(r.aims), r);
+    return r;
+  }
+
+  /// Calls f(begin, end, samples) for each voxel.
+  template <class F>
+  void for_each_voxel(const OnVoxels& on, F&& f) const {
+    std::vector<Sample> samples;
+    for (std::size_t v = 0; v + 1 < on.begin.size(); ++v) {
+      samples.clear();
+      for (std::uint32_t i = on.begin[v]; i < on.begin[v + 1]; ++i) {
+        const auto more = comparisons_.of(on.sorted.order[i]);
+        samples.insert(samples.end(), more.begin(), more.end());
+      }
+      f(on.begin[v], on.begin[v + 1], std::span<const Sample>(samples));
+    }
+  }
+
+  [[nodiscard]] Channel decoded(const ColorAims& aims) const {
+    Channel c{original_.info, Bytes(aims.rgb.size() * original_.info.stride())};
+    for (std::size_t i = 0; i < aims.rgb.size(); ++i) {
+      std::array<std::int64_t, 3> v;
+      for (std::size_t d = 0; d < 3; ++d)
+        v[d] = static_cast<std::int64_t>(std::lround(double(aims.rgb[i][d]) * (1 << kColorFraction)));
+      store_rgb(c, i, {v[0] + v[1] + v[2], v[0] - v[2], v[0] - 2 * v[1] + v[2]}, scale_);
+    }
+    return c;
+  }
+
+  /// @param colors  in the order of the voxels.
+  [[nodiscard]] double error_of(const Channel& colors, const OnVoxels& on) const {
+    Channel c{colors.info, Bytes(colors.data.size())};
+    for (std::size_t i = 0; i < on.sorted.order.size(); ++i)
+      std::memcpy(c.at(on.sorted.order[i]), colors.at(i), c.info.stride());
+    return color_error_between(original_, c, near_, ties_);
+  }
+
+  /// The coarsest voxels whose floor is at most `most`, by bisection; or the finest.
+  OnVoxels coarsest(double most, OnVoxels finest) const {
+    OnVoxels best = std::move(finest);
+    unsigned high = surface::most_voxel_shift(encoding_.header.depth) + 1u;
+    while (best.shift + 1u < high) {
+      OnVoxels trial = on_voxels(static_cast<std::uint8_t>((best.shift + high) / 2));
+      if (trial.floor <= most) {
+        best = std::move(trial);
+      } else {
+        high = trial.shift;
+      }
+    }
+    return best;
+  }
+
+  /// One coding, and what it says of the next one's aims and weights.
+  SurfaceColor code(OnVoxels& on, double slope) {
+    const double step = std::sqrt(slope * usual_);
+    // Weights are about two comparisons over the usual distance.
+    ColorAims& aims = on.aims;
+    if (first_) std::fill(aims.weights.begin(), aims.weights.end(), static_cast<float>(2 / usual_));
+    first_ = false;
+    ChannelEncoding e = encoder_->encode(
+        aims, static_cast<std::uint32_t>(std::clamp(16 * step, 1.0, 1048576.0)), kPrice * slope);
+    SurfaceColor r{std::move(e.bytes), on.shift, error_of(e.decoded, on)};
+    learn(on, e.decoded, static_cast<float>(std::max(1.0, kAlike * r.error)));
+    return r;
+  }
+
+  void learn(OnVoxels& on, const Channel& decoded, float alike) {
+    const float unit = scale_ == ColorScale::sixteen ? 1.0f / 257 : 1.0f;
+    double sum = 0;
+    for_each_voxel(on, [&](std::uint32_t begin, std::uint32_t end, std::span<const Sample> samples) {
+      const auto v = load_rgb(decoded, begin);
+      float weight = 0;
+      const Rgb aim = mean_around(
+          samples,
+          {static_cast<float>(v[0]) * unit, static_cast<float>(v[1]) * unit, static_cast<float>(v[2]) * unit},
+          alike, weight);
+      sum += double(weight);
+      for (std::uint32_t i = begin; i < end; ++i) {
+        on.aims.rgb[i] = aim;
+        on.aims.weights[i] = weight / static_cast<float>(end - begin);
+      }
+    });
+    usual_ = 2 * static_cast<double>(on.sorted.order.size()) / sum;
+  }
+
+  SurfaceColor code_at(OnVoxels& on, double slope) {
+    SurfaceColor r = code(on, slope);
+    for (int i = 1; i < passes_; ++i) r = code(on, slope);
+    return r;
+  }
+
+  /// Slopes by secants in logarithms until the error is near the bound.
+  SurfaceColor code_within(OnVoxels& on, double bound) {
+    constexpr int kTries = 8;
+    constexpr double kAim = 0.985, kNear = 0.965, kExponent = 0.22;
+    double slope = 20 * bound, low = 0, high = 0;
+    std::optional<SurfaceColor> best;
+    for (int i = 0; i < kTries; ++i) {
+      SurfaceColor r = code(on, slope);
+      const bool kept = r.error <= bound;
+      (kept ? low : high) = slope;
+      const double over = kAim * bound / std::max(r.error, 1e-3);
+      const bool near = kept && r.error >= kNear * bound;
+      if (!best || is_better(r, *best, bound)) best = std::move(r);
+      if (near && i + 1 >= passes_) break;
+      slope *= std::clamp(std::pow(over, 1 / kExponent), 1.0 / 16, 16.0);
+      if (low > 0 && high > 0 && low < high && (slope <= low || slope >= high)) slope = std::sqrt(low * high);
+      slope = std::clamp(slope, 1e-4, 1e8);
+    }
+    return std::move(*best);
+  }
+
+  static bool is_better(const SurfaceColor& a, const SurfaceColor& b, double bound) {
+    if ((a.error <= bound) != (b.error <= bound)) return a.error <= bound;
+    return a.error <= bound ? a.bytes.size() < b.bytes.size() : a.error < b.error;
+  }
+
+  const ChannelSchema& channel_;
+  const Channel& original_;
+  const NearestPair& near_;
+  const SamePositions& ties_;
+  const SurfaceEncoding& encoding_;
+  int passes_;
+  ColorScale scale_;
+  Comparisons comparisons_;
+  std::optional<CoarseColorEncoder> encoder_;
+  double usual_ = 1;  ///< harmonic mean of the distances
+  bool first_ = true;
+};
+
+}  // namespace
+
+Result<SurfaceColor> encode_surface_color(const ChannelSchema& channel, const Channel& original,
+                                          const NearestPair& near, const SamePositions& ties,
+                                          const SurfaceEncoding& encoding, Effort effort, double slope) {
+  return ColorSearch(channel, original, near, ties, encoding, effort).run(slope);
+}
+
+}  // namespace mapcodec
