@@ -93,8 +93,8 @@ class Insert(DaemonTest):
     def test_scans_that_add_nothing_leave_no_gap(self):
         self.create()
         same = scan_of(1, 1000)
-        self.assertEqual(insert(self.stub, "m", [scan(1, same), scan(2, same)], writer="r")[0], 2)
-        insert(self.stub, "m", [scan(3, same)], writer="r")
+        for sequence in 1, 2, 3:  # each on its own: scans that share a commit are not compared with each other
+            insert(self.stub, "m", [scan(sequence, same)], writer="r")
         self.daemon.stop()
         self.start()
         replies = list(self.stub.Insert(iter([opening("m", "r", acknowledged=3), scan(4, scan_of(2, 1000))]), timeout=60))
