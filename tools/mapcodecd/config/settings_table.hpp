@@ -24,7 +24,8 @@ void visit_storage(Settings& s, Visitor& v) {
   v.value("cache_bytes", s.service.cache_bytes, "Hot tiles in memory.", Range{0, 1e15});
   v.value("max_maps", s.service.max_maps, "More are not created.", Range{1, 1e7});
   v.value("max_editors", s.service.max_editors, "Maps that are written to at the same time.", Range{1, 1e5});
-  v.value("editor_cache_bytes", s.editor_cache_bytes, "What is known of a map that is written to.", Range{0, 1e15});
+  v.value("editor_cache_bytes", s.editor_cache_bytes, "What is known of a map that is written to.",
+          Range{0, 1e15});
   v.value("editor_idle_s", s.service.editor_idle_s, "After this rest a map's writer is closed.", kTime);
 
   v.section("commits", "How scans become revisions.");
@@ -52,12 +53,14 @@ void visit_transports(Settings& s, Visitor& v) {
   v.value("listen", s.grpc.listen, "Loopback unless told otherwise; port 0 takes a free one.", Range{});
   v.value("max_message_bytes", s.grpc.max_message_bytes, "Longest message that is read.",
           Range{1024, 1 << 30});
-  v.value("max_connections", s.grpc.max_connections, "At once.", Range{1, 1e6});
+  v.value("max_connections", s.grpc.max_connections, "At once; more are closed.", Range{1, 1e6});
   v.value("max_streams_per_connection", s.grpc.max_streams_per_connection, "Calls at once on one connection.",
           Range{1, 1e5});
   v.value("stream_window_points", s.grpc.stream_window_points,
           "Points of one Insert stream that wait for a commit.", Range{1, 1e12});
   v.value("idle_stream_s", s.grpc.idle_stream_s, "An Insert stream that sends nothing for so long ends.",
+          kSeconds);
+  v.value("idle_connection_s", s.grpc.idle_connection_s, "A connection without a call for so long ends.",
           kSeconds);
   v.value("handshake_s", s.grpc.handshake_s, "For the beginning of a connection.", kSeconds);
   v.value("workers", s.grpc.workers, "Threads for calls that wait or decode.", Range{1, 1024});

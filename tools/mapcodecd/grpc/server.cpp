@@ -3,15 +3,14 @@
 
 #include <grpcpp/ext/proto_server_reflection_plugin.h>
 #include <grpcpp/health_check_service_interface.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
 #include <fstream>
 #include <sstream>
 
 #include "tools/mapcodecd/config/listen_address.hpp"
+#include "tools/mapcodecd/grpc/acceptor.hpp"
 #include "tools/mapcodecd/grpc/map_calls.hpp"
-#include "tools/mapcodecd/http/listening_socket.hpp"
+#include "tools/mapcodecd/tls/tls_context.hpp"
 
 namespace mapcodec::daemon {
 namespace {
@@ -45,6 +44,12 @@ Result<std::shared_ptr<grpc::ServerCredentials>> credentials_for(const ListenAdd
   return grpc::SslServerCredentials(options);
 }
 
+/// What gRPC would find out with the first connection, and tell nobody.
+Status check_certificates(const TlsSettings& tls) {
+  const auto context = TlsContext::open(tls);
+  return context.ok() ? Status() : Status(context.error());
+}
+
 void set_limits(grpc::ServerBuilder& builder, const GrpcSettings& s) {
   builder.SetMaxReceiveMessageSize(static_cast<int>(s.max_message_bytes));
   builder.SetMaxSendMessageSize(static_cast<int>(s.max_message_bytes));
@@ -55,7 +60,8 @@ void set_limits(grpc::ServerBuilder& builder, const GrpcSettings& s) {
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, 10000);
   builder.AddChannelArgument(GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS, 10000);
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_PERMIT_WITHOUT_CALLS, 1);
-  builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
+  // A connection without a call gives its place to others; clients connect again without being asked.
+  builder.AddChannelArgument(GRPC_ARG_MAX_CONNECTION_IDLE_MS, static_cast<int>(1000 * s.idle_connection_s));
   // A frame of 16 KiB each costs more than the bytes do.
   builder.AddChannelArgument(GRPC_ARG_HTTP2_MAX_FRAME_SIZE, 1 << 20);
 }
@@ -68,10 +74,10 @@ struct GrpcServer::Impl {
         pool(s.workers, s.waiting_calls),
         steps(s.workers, s.waiting_calls),
         context{settings, m, a, k, pool, steps, streams, stopping, std::move(r)},
-        calls(context) {}
+        calls(context),
+        acceptor(s.max_connections) {}
 
   Status listen(grpc::ServerBuilder& builder);
-  Status name_addresses();
   void watch_clock();
 
   const GrpcSettings settings;
@@ -80,10 +86,9 @@ struct GrpcServer::Impl {
   WorkerPool pool, steps;
   CallContext context;
   MapCalls calls;
-  std::vector<ListenAddress> asked;
-  std::vector<int> ports;
   std::vector<std::string> addresses;
   std::unique_ptr<grpc::Server> server;
+  ConnectionAcceptor acceptor;  ///< after the server: ends before it
   std::mutex mutex;
   std::condition_variable wake;
   bool ended = false;
@@ -91,33 +96,21 @@ struct GrpcServer::Impl {
 };
 
 Status GrpcServer::Impl::listen(grpc::ServerBuilder& builder) {
+  if (settings.tls.enabled()) MAPCODEC_TRY(check_certificates(settings.tls));
   for (const std::string& text : settings.listen) {
     MAPCODEC_ASSIGN(const ListenAddress address, parse_listen_address(text));
     MAPCODEC_TRY(check_listen(address, settings.tls.enabled(), settings.insecure));
     MAPCODEC_ASSIGN(const auto credentials, credentials_for(address, settings.tls));
-    if (is_socket(address)) remove_stale_socket(address);
-    asked.push_back(address);
-  }
-  ports.assign(asked.size(), 0);
-  for (std::size_t i = 0; i < asked.size(); ++i) {
-    const auto credentials = credentials_for(asked[i], settings.tls);
-    builder.AddListeningPort(asked[i].to_string(), credentials.value(), &ports[i]);
-  }
-  return {};
-}
-
-Status GrpcServer::Impl::name_addresses() {
-  for (std::size_t i = 0; i < asked.size(); ++i) {
-    if (is_socket(asked[i])) {
-      addresses.push_back(settings.listen[i]);
-      if (::chmod(asked[i].path.c_str(), 0600) != 0)
-        return make_error(ErrorCode::kCannotWrite, asked[i].path + ": cannot be made private");
-      continue;
-    }
-    if (ports[i] == 0) return make_error(ErrorCode::kCannotWrite, settings.listen[i] + ": cannot be bound");
-    ListenAddress bound = asked[i];
-    bound.port = static_cast<std::uint16_t>(ports[i]);
-    addresses.push_back(bound.to_string());
+    MAPCODEC_ASSIGN(ListeningSocket socket, listen_on(address));
+    addresses.push_back(socket.address.to_string());
+    const std::shared_ptr<grpc::experimental::ExternalConnectionAcceptor> door =
+        builder.experimental().AddExternalConnectionAcceptor(
+            grpc::ServerBuilder::experimental_type::ExternalConnectionType::FROM_FD, credentials);
+    acceptor.add(std::move(socket), [door](int fd) {
+      grpc::experimental::ExternalConnectionAcceptor::NewConnectionParameters connection;
+      connection.fd = fd;
+      door->HandleNewConnection(&connection);
+    });
   }
   return {};
 }
@@ -145,17 +138,13 @@ Result<std::unique_ptr<GrpcServer>> GrpcServer::start(const GrpcSettings& settin
     auto impl = std::make_unique<Impl>(settings, service, access, metrics, std::move(record));
     grpc::ServerBuilder builder;
     set_limits(builder, settings);
-    // Nobody but us may connect to a socket, from its first moment on.
-    const mode_t mask = ::umask(0177);
-    Status s = impl->listen(builder);
+    MAPCODEC_TRY(impl->listen(builder));
     builder.RegisterService(&impl->calls);
-    if (s.ok()) impl->server = builder.BuildAndStart();
-    ::umask(mask);
-    MAPCODEC_TRY(s);
+    impl->server = builder.BuildAndStart();
     if (impl->server == nullptr)
       return make_error(ErrorCode::kCannotWrite,
-                        settings.listen.front() + ": cannot be bound (or bad certificates)");
-    MAPCODEC_TRY(impl->name_addresses());
+                        settings.listen.front() + ": gRPC cannot start (or bad certificates)");
+    impl->acceptor.start();
     impl->clock = std::thread([i = impl.get()] { i->watch_clock(); });
     return std::unique_ptr<GrpcServer>(new GrpcServer(std::move(impl)));
   } catch (const std::exception& e) {
@@ -178,6 +167,7 @@ void GrpcServer::set_serving(bool serving) {
 void GrpcServer::stop(std::chrono::system_clock::time_point deadline) {
   if (impl_->stopping.exchange(true)) return;
   impl_->server->GetHealthCheckService()->SetServingStatus(false);
+  impl_->acceptor.stop();
   impl_->streams.each([](OpenStream& s) { s.wind_up(); });
   impl_->server->Shutdown(deadline);
   impl_->server->Wait();
@@ -187,9 +177,6 @@ void GrpcServer::stop(std::chrono::system_clock::time_point deadline) {
   }
   impl_->wake.notify_one();
   impl_->clock.join();
-  for (const ListenAddress& a : impl_->asked) {
-    if (is_socket(a)) ::unlink(a.path.c_str());
-  }
 }
 
 }  // namespace mapcodec::daemon

@@ -67,7 +67,7 @@ int bind_privately(int fd, const SocketAddress& name) {
 Status bind_to(int fd, const ListenAddress& address) {
   const SocketAddress name = socket_address(address);
   if (address.kind == ListenAddress::Kind::unix_socket) {
-    remove_stale_socket(address);
+    if (is_stale(name, address.path)) unlink(address.path.c_str());
     if (bind_privately(fd, name) != 0) return failed(address, "cannot be bound");
     return {};
   }
@@ -89,10 +89,6 @@ std::uint16_t bound_port(int fd) {
 }
 
 }  // namespace
-
-void remove_stale_socket(const ListenAddress& address) {
-  if (is_stale(socket_address(address), address.path)) unlink(address.path.c_str());
-}
 
 Result<ListeningSocket> listen_on(const ListenAddress& address) {
   const int family = address.kind == ListenAddress::Kind::unix_socket ? AF_UNIX

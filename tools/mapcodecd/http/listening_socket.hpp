@@ -14,10 +14,6 @@ struct ListeningSocket {
   ListenAddress address;  ///< as bound: with its port
 };
 
-/// Removes a unix socket that nobody serves any more. One that is served stays: its daemon would go on without
-/// being reached.
-void remove_stale_socket(const ListenAddress& address);
-
 /// A unix socket gets mode 0600; one that nobody serves any more is replaced.
 /// Errors: CannotWrite (address in use, permission, no such folder).
 [[nodiscard]] Result<ListeningSocket> listen_on(const ListenAddress& address);
