@@ -6,14 +6,18 @@ import http.client
 import os
 import random
 import resource
+import shutil
 import socket
 import ssl
 import stat
 import struct
 import subprocess
+import tempfile
 import threading
 import time
 import unittest
+import warnings
+from pathlib import Path
 
 import grpc
 
@@ -149,7 +153,7 @@ class LocalPolicy(DaemonTest):
                      lambda: self.stub.Stats(pb.StatsRequest(map="m"), metadata=bearer("mct_wrong"), timeout=20))
 
 
-class Listening(unittest.TestCase, ):
+class Listening(unittest.TestCase):
     def refused(self, *arguments):
         outcome = subprocess.run([DAEMON, "--data", "/tmp", *arguments], capture_output=True, text=True, timeout=60)
         self.assertEqual(outcome.returncode, 2, outcome)
@@ -167,21 +171,13 @@ class Listening(unittest.TestCase, ):
             self.refused("--listen", address, "--insecure")
 
 
-class Sockets(DaemonTest):
-    def setUp(self):
-        pass
-
-    def test_socket_is_private(self):
-        super().setUp.__func__  # the folder is made below, with a socket instead of a port
-        import shutil
-        import tempfile
-        from pathlib import Path
-        self.folder = Path(tempfile.mkdtemp(prefix="mapcodec-daemon-"))
-        self.addCleanup(shutil.rmtree, self.folder, ignore_errors=True)
-        self.data = self.folder / "maps"
-        self.data.mkdir()
-        grpc_socket, http_socket = self.folder / "grpc.sock", self.folder / "http.sock"
-        daemon = Daemon(self.data, "--http", f"unix:{http_socket}", listen=f"unix:{grpc_socket}")
+class Sockets(unittest.TestCase):
+    def test_sockets_are_private(self):
+        folder = Path(tempfile.mkdtemp(prefix="mapcodec-daemon-"))
+        self.addCleanup(shutil.rmtree, folder, ignore_errors=True)
+        data, grpc_socket, http_socket = folder / "maps", folder / "grpc.sock", folder / "http.sock"
+        data.mkdir()
+        daemon = Daemon(data, "--http", f"unix:{http_socket}", listen=f"unix:{grpc_socket}")
         self.addCleanup(daemon.kill)
         for path in (grpc_socket, http_socket):
             self.assertEqual(stat.S_IMODE(path.stat().st_mode), 0o600)
@@ -189,6 +185,9 @@ class Sockets(DaemonTest):
             self.assertEqual(len(rpc.MapServiceStub(channel).ListMaps(pb.ListMapsRequest(), timeout=20).maps), 0)
         page = subprocess.run(["curl", "-s", "--unix-socket", http_socket, "http://localhost/healthz"], capture_output=True)
         self.assertEqual(page.stdout, b"ok\n")
+        # A socket that is served is not taken away.
+        second = subprocess.run([DAEMON, "--data", data, "--listen", f"unix:{grpc_socket}"], capture_output=True, text=True, timeout=60)
+        self.assertEqual(second.returncode, 4, second)
         self.assertEqual(daemon.stop(), 0)
         self.assertFalse(grpc_socket.exists() or http_socket.exists())
 
@@ -197,7 +196,6 @@ class Certificates(SecureTest):
     client_ca = False
 
     def setUp(self):
-        import tempfile
         self.papers = tempfile.TemporaryDirectory()
         self.addCleanup(self.papers.cleanup)
         self.authority = Authority(self.papers.name)
@@ -230,7 +228,6 @@ class Tls(Certificates):
         self.assertEqual(len(self.list_maps().maps), 0)
         self.assertEqual(self.curl("--cacert", self.authority.certificate), (0, "200"))
         self.refuses(grpc.StatusCode.UNAUTHENTICATED, lambda: self.list_maps(token="mct_wrong"))
-        self.assertEqual(self.curl("--cacert", self.authority.certificate, "-H", "Authorization: Bearer x")[1], "401")
 
     def test_strangers_and_plain_text(self):
         other = Authority(self.papers.name, "other")
@@ -242,7 +239,10 @@ class Tls(Certificates):
         for address in (self.daemon.address, self.https()):
             with socket.create_connection(self.split(address), timeout=10) as plain:
                 plain.sendall(b"GET /healthz HTTP/1.1\r\n\r\n")
-                self.assertNotIn(b"200", plain.recv(1000))
+                try:
+                    self.assertNotIn(b"200", plain.recv(1000))
+                except ConnectionResetError:
+                    pass  # also an answer
         self.assertEqual(self.curl("--cacert", self.authority.certificate)[1], "200")
 
     def https(self):
@@ -256,6 +256,7 @@ class Tls(Certificates):
     def test_old_protocols(self):
         context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
         context.check_hostname, context.verify_mode = False, ssl.CERT_NONE
+        warnings.simplefilter("ignore", DeprecationWarning)
         context.minimum_version = context.maximum_version = ssl.TLSVersion.TLSv1_1
         context.set_ciphers("ALL:@SECLEVEL=0")
         for address in (self.daemon.address, self.https()):
@@ -339,7 +340,7 @@ class Frames:
 
 
 class TooMuch(SecureTest):
-    config = '[http]\nmax_connections = 300\n[grpc]\nhandshake_s = 2.0\n[limits]\nrequests_per_s = 0.0\n'
+    config = '[http]\nmax_connections = 300\n[grpc]\nmax_connections = 400\nhandshake_s = 2.0\n[limits]\nrequests_per_s = 0.0\n'
 
     def rss(self):
         with open(f"/proc/{self.daemon.process.pid}/statm") as f:
@@ -411,6 +412,7 @@ class TooMuch(SecureTest):
         limit = resource.getrlimit(resource.RLIMIT_NOFILE)[0]
         count = min(CONNECTIONS, limit - 200)
         before = len(os.listdir(files))
+        self.stub.ListMaps(pb.ListMapsRequest(), timeout=30)
         for kind in ("http", "grpc"):
             address = self.daemon.address if kind == "grpc" else next(
                 a for a in self.daemon.port_file.read_text().split() if "http" in a).split("//")[1]
@@ -421,11 +423,10 @@ class TooMuch(SecureTest):
                 while len(held) < count and time.monotonic() < end:
                     held.append(socket.create_connection((host, int(port)), timeout=20))
                 self.assertEqual(len(held), count)
+                self.assertLess(len(os.listdir(files)), before + (340 if kind == "http" else 440))
                 self.assertEqual(self.http_status("/healthz"), 200)
-                self.stub.ListMaps(pb.ListMapsRequest(), timeout=30)
-                if kind == "http":
-                    self.assertLess(len(os.listdir(files)), before + 330)
-                else:
+                self.stub.ListMaps(pb.ListMapsRequest(), timeout=30)  # by a connection that it had before
+                if kind == "grpc":
                     for _ in range(200):  # they said nothing: after the time for a handshake they are gone
                         if len(os.listdir(files)) < before + 100:
                             break
@@ -439,6 +440,15 @@ class TooMuch(SecureTest):
                 break
             time.sleep(0.1)
         self.assertLessEqual(len(os.listdir(files)), before + 10)
+
+    def test_no_more_files(self):
+        """A process that has no more files for connections is well again as soon as it has."""
+        resource.prlimit(self.daemon.process.pid, resource.RLIMIT_NOFILE, (len(os.listdir(f"/proc/{self.daemon.process.pid}/fd")) + 60,) * 2)
+        held = [Frames(self.daemon.address) for _ in range(200)]
+        for frames in held:
+            frames.socket.close()
+        self.create()
+        insert(self.stub, "m", [scan(1, scan_of(1, 100))])
 
     def test_malformed_protobuf(self):
         self.create()
