@@ -13,7 +13,8 @@ packages=(
   libcli11-dev libspdlog-dev nlohmann-json3-dev libpng-dev                  # the programs
   libdraco-dev gnuplot-nox zstd xz-utils                                    # what the benchmarks compare with and draw
   liblz4-dev libbz2-dev libpugixml-dev libyaml-cpp-dev                      # ROS bags, E57, Autoware's metadata
-  libgtest-dev python3 librosbag-storage-dev python3-grpcio grpc-proto curl openssl mrpt-common  # tests
+  libcpp-httplib-dev libssl-dev libbrotli-dev libsqlite3-dev libtomlplusplus-dev prometheus-cpp-dev libsystemd-dev  # the daemon
+  libgtest-dev python3 librosbag-storage-dev python3-grpcio grpc-proto python3-prometheus-client curl openssl mrpt-common  # tests
 )
 [[ "${1:-}" == fuzz ]] && packages+=(clang-14 libclang-rt-14-dev)
 
