@@ -23,6 +23,7 @@ struct GrpcSettings {
   TlsSettings tls;        ///< of the ports that are no sockets
   bool insecure = false;  ///< plain text beyond loopback
   std::uint64_t max_message_bytes = std::uint64_t{16} << 20;
+  std::uint64_t memory_bytes = std::uint64_t{512} << 20;  ///< of buffers of all connections
   std::uint32_t max_connections = 1000;
   std::uint32_t max_streams_per_connection = 64;
   std::uint64_t stream_window_points = std::uint64_t{1} << 19;  ///< of one Insert stream, not yet committed

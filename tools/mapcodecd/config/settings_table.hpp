@@ -53,6 +53,8 @@ void visit_transports(Settings& s, Visitor& v) {
   v.value("listen", s.grpc.listen, "Loopback unless told otherwise; port 0 takes a free one.", Range{});
   v.value("max_message_bytes", s.grpc.max_message_bytes, "Longest message that is read.",
           Range{1024, 1 << 30});
+  v.value("memory_bytes", s.grpc.memory_bytes, "Buffers of all connections; then calls are cut off.",
+          Range{1 << 20, 1e15});
   v.value("max_connections", s.grpc.max_connections, "At once; more are closed.", Range{1, 1e6});
   v.value("max_streams_per_connection", s.grpc.max_streams_per_connection, "Calls at once on one connection.",
           Range{1, 1e5});

@@ -52,6 +52,8 @@ Status check_certificates(const TlsSettings& tls) {
 
 void set_limits(grpc::ServerBuilder& builder, const GrpcSettings& s) {
   builder.SetMaxReceiveMessageSize(static_cast<int>(s.max_message_bytes));
+  // gRPC looks at a message's size once all of it is there: this is what bounds those that never end.
+  builder.SetResourceQuota(grpc::ResourceQuota("mapcodecd").Resize(s.memory_bytes));
   builder.SetMaxSendMessageSize(static_cast<int>(s.max_message_bytes));
   builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS, static_cast<int>(s.max_streams_per_connection));
   builder.AddChannelArgument("grpc.server_handshake_timeout_ms", static_cast<int>(1000 * s.handshake_s));
