@@ -9,11 +9,10 @@ packages=(
   libmrpt-maps-dev libmrpt-slam-dev liboctomap-dev                          # MRPT's logs and maps, octrees of OctoMap
   libcgal-dev libgmp-dev libmpfr-dev libpcl-dev                             # the 2014 paper's encoder, test oracles
   libgrpc++-dev libprotobuf-dev protobuf-compiler-grpc protobuf-compiler    # the map service
-  libsqlite3-dev libssl-dev libcpp-httplib-dev prometheus-cpp-dev libtomlplusplus-dev libsystemd-dev  # its catalogue, HTTP, figures
+  libsqlite3-dev libssl-dev libbrotli-dev libcpp-httplib-dev prometheus-cpp-dev libtomlplusplus-dev libsystemd-dev  # its catalogue, HTTP, figures
   libcli11-dev libspdlog-dev nlohmann-json3-dev libpng-dev                  # the programs
   libdraco-dev gnuplot-nox zstd xz-utils                                    # what the benchmarks compare with and draw
   liblz4-dev libbz2-dev libpugixml-dev libyaml-cpp-dev                      # ROS bags, E57, Autoware's metadata
-  libcpp-httplib-dev libssl-dev libbrotli-dev libsqlite3-dev libtomlplusplus-dev prometheus-cpp-dev libsystemd-dev  # the daemon
   libgtest-dev python3 librosbag-storage-dev python3-grpcio grpc-proto python3-prometheus-client curl openssl mrpt-common  # tests
 )
 [[ "${1:-}" == fuzz ]] && packages+=(clang-14 libclang-rt-14-dev)
