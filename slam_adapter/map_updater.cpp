@@ -151,6 +151,12 @@ struct MapUpdater::State {
   Status fold_some(const std::vector<Place>& places);
   Status split_large(std::vector<Place> places);
   Result<std::vector<Place>> split_one(const Place& place);
+  Status holds_points() const {
+    if (!schema.occupancy) return {};
+    return make_error(
+        ErrorCode::kUnsupported,
+        "is a map of an octree: its leaves change by an update with a .bt or .ot, not point by point");
+  }
   Status stopped() const {
     return settings.stop != nullptr && *settings.stop ? Status(make_error(ErrorCode::kCancelled, "stopped"))
                                                       : Status{};
@@ -541,6 +547,7 @@ Status MapUpdater::set_stamps(std::uint32_t submap, double first_s, double last_
 
 Status MapUpdater::insert(PointCloud points, std::uint32_t submap) {
   State& s = *state_;
+  MAPCODEC_TRY(s.holds_points());
   std::uint64_t dropped = 0;
   MAPCODEC_ASSIGN(PointCloud fitted, fit_to_schema(std::move(points), s.schema, dropped));
   s.report.dropped_points += dropped;
@@ -575,6 +582,7 @@ Status MapUpdater::State::erase(const std::optional<Erasure>& e, std::optional<s
 }
 
 Status MapUpdater::erase(const std::optional<Erasure>& e, std::optional<std::uint32_t> submap) {
+  MAPCODEC_TRY(state_->holds_points());
   MAPCODEC_TRY(flush());
   return state_->remember(state_->erase(e, submap));
 }

@@ -26,7 +26,7 @@ struct UpdateSettings {
   /// What begins a tile is coded once, with the whole promise, instead of quickly and pending: for points to
   /// which nothing will be added, as those of a keyframe.
   bool for_good = false;
-  std::size_t fold_after = 24;   ///< pending segments of a tile at which the next commit folds it; 0: never
+  std::size_t fold_after = 24;  ///< pending segments of a tile at which the next commit folds it; 0: never
   /// A tile of more points becomes up to eight smaller ones, where the map has smaller ones and no point
   /// would be coded with loss more than twice.
   std::uint64_t split_points = std::uint64_t{1} << 20;
@@ -81,11 +81,12 @@ class MapUpdater {
   /// @param points  [m, submap frame]; channels in any order. What the map does not keep is left out; what it
   /// keeps must be there. Points that are not finite are dropped and counted (lossless maps: kept).
   /// Errors: Malformed (a kept channel is missing or of another type, another constant), InvalidArgument
-  /// (coordinates that a lossless map cannot hold), those of `flush`.
+  /// (coordinates that a lossless map cannot hold), Unsupported (a map of an octree alone), those of `flush`.
   [[nodiscard]] Status insert(PointCloud points, std::uint32_t submap = 0);
   /// Erases points of one submap, or of all (then `e` is in the map's frame, and a box needs submaps that are
   /// not rotated; nothing: all points). Tiles that are left empty go away.
-  /// Errors: InvalidArgument (a channel that the map does not keep, a rotated box), those of `flush`.
+  /// Errors: InvalidArgument (a channel that the map does not keep, a rotated box), Unsupported (a map of an
+  /// octree alone), those of `flush`.
   [[nodiscard]] Status erase(const std::optional<Erasure>& e, std::optional<std::uint32_t> submap);
   /// Folds the pending segments of tiles that have at least `least` (1: all).
   [[nodiscard]] Status fold(std::size_t least = 1);

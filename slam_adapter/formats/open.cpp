@@ -64,7 +64,7 @@ ReaderResult open_reader(const ByteStream& stream, Format format) {
                       std::string("is an ") + info.name + ": give its path, not its bytes");
   const std::string what = format == Format::unknown
                                ? "is not recognised: "
-                               : std::string("is ") + info.name + ", which is not supported yet: ";
+                               : std::string("is ") + info.name + ", which is not read here: ";
   return make_error(ErrorCode::kUnsupported, what + info.advice);
 }
 
