@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "tools/mapcodecd/grpc/server.hpp"
 
+#include <google/protobuf/stubs/logging.h>
+#include <grpc/support/log.h>
 #include <grpcpp/ext/proto_server_reflection_plugin.h>
 #include <grpcpp/health_check_service_interface.h>
 
+#include <cstdlib>
 #include <fstream>
 #include <sstream>
 
@@ -131,6 +134,9 @@ Result<std::unique_ptr<GrpcServer>> GrpcServer::start(const GrpcSettings& settin
                                                       AccessControl& access, ServiceMetrics& metrics,
                                                       RecordRequest record) {
   static const bool plugins = [] {
+    // What clients send wrong is told to them; lines of others' libraries would break a log of JSON lines.
+    google::protobuf::SetLogHandler(nullptr);
+    if (std::getenv("GRPC_VERBOSITY") == nullptr) gpr_set_log_function([](gpr_log_func_args*) {});
     grpc::EnableDefaultHealthCheckService(true);
     grpc::reflection::InitProtoReflectionServerBuilderPlugin();
     return true;
