@@ -213,6 +213,10 @@ void HttpListener::Impl::attend(Connection& connection) {
 
 void HttpListener::Impl::park(Connection& connection, std::uint32_t events) {
   if (connection.in_request()) connection.request_until(after(settings.read_timeout_s));
+  if (connection.deadline() <= Clock::now()) {  // a sweep may miss one that is busy with a byte each time
+    ++timed_out;
+    return table.end(connection);
+  }
   const int fd = connection.fd();
   table.rest(connection);
   // From here on it may be gone, and its number another's: then this wakes that one for nothing.
