@@ -46,8 +46,12 @@ constexpr FormatInfo kInfos[] = {
     {Format::rawlog, "MRPT rawlog", nullptr},
     {Format::simplemap, "MRPT simplemap", nullptr},
     {Format::mrpt_object, "MRPT object", nullptr},
-    {Format::octomap_bt, "OctoMap .bt", "octrees beside points want a call of their own"},
-    {Format::octomap_ot, "OctoMap .ot", "octrees beside points want a call of their own"},
+    {Format::octomap_bt, "OctoMap .bt",
+     "octrees want a call of their own; as points, convert it first with OctoMap's 'octree2pointcloud IN.bt "
+     "OUT.pcd'"},
+    {Format::octomap_ot, "OctoMap .ot",
+     "octrees want a call of their own; as points, convert it first with OctoMap's 'octree2pointcloud' after "
+     "'convert_octree IN.ot OUT.bt'"},
     {Format::pcap, "pcap", "export its scans to PCD first with the sensor maker's tool"},
     {Format::hdf5, "HDF5", "export its points to PLY or PCD first"},
     {Format::image, "an image", "points are wanted: convert depth images to clouds first"},
