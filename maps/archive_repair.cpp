@@ -4,11 +4,11 @@
 
 #include "maps/compaction.hpp"
 #include "maps/file_store.hpp"
-#include "maps/store_schemes.hpp"
 #include "maps/flip_correction.hpp"
 #include "maps/map_archive.hpp"
 #include "maps/metadata_codec.hpp"
 #include "maps/revision_writer.hpp"
+#include "maps/store_schemes.hpp"
 #include "maps/tile_rescue.hpp"
 
 namespace mapcodec {

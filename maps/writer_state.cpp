@@ -157,12 +157,13 @@ Result<CommitRecord> WriterState::make_record(std::int64_t timestamp_s, std::siz
                                               std::size_t head_bytes) const {
   if (head_bytes > kMaxBlockBytes)
     return make_error(ErrorCode::kLimitExceeded, "the index of the map is too large");
-  return CommitRecord{false,
-                      timestamp_s,
-                      last.offset,
-                      static_cast<std::uint32_t>(next_revision > 0 ? next_revision : last.record.revision + 1),
-                      static_cast<std::uint32_t>(index_bytes),
-                      static_cast<std::uint32_t>(head_bytes - index_bytes)};
+  return CommitRecord{
+      false,
+      timestamp_s,
+      last.offset,
+      static_cast<std::uint32_t>(next_revision > 0 ? next_revision : last.record.revision + 1),
+      static_cast<std::uint32_t>(index_bytes),
+      static_cast<std::uint32_t>(head_bytes - index_bytes)};
 }
 
 Result<std::uint64_t> WriterState::commit(std::int64_t timestamp_s) {

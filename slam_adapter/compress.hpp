@@ -27,7 +27,7 @@ struct CompressOptions {
   /// made finer. Otherwise what is reachable is recorded as the bound, with a warning.
   bool color_error_asked = false;
   std::vector<std::string> channels{"all"};  ///< "all", "none" or names
-  bool constants = true;  ///< a channel that is the same for all points is stored once, for good
+  bool constants = true;   ///< a channel that is the same for all points is stored once, for good
   double tile_size_m = 0;  ///< 0: from the density, 100,000 points a tile, 600,000 of surfaces
   Effort effort = Effort::standard;
   bool keep_order = false;      ///< lossless: also the order of points

@@ -238,7 +238,8 @@ class Optimizer {
     const Shape shape{cell, plane, polygon, beside, rough};
     double missed = 0;
     if (probe(shape, std::min(limit, cost_of(best)), r, missed)) take_if_better(r, best);
-    if (missed < lambda_ * kWedgeBits || least + lambda_ * (r.bits + 8) >= std::min(limit, cost_of(best))) return;
+    if (missed < lambda_ * kWedgeBits || least + lambda_ * (r.bits + 8) >= std::min(limit, cost_of(best)))
+      return;
     consider_wedge(shape, c, flags, r, limit, best);
   }
 
@@ -274,7 +275,8 @@ class Optimizer {
   bool probe(const Shape& s, double to_beat, Candidate& r, double& missed) {
     const std::uint32_t n = s.cell.count();
     set_error(r, error_of(s, 0, r.noise));
-    const double most = std::max((to_beat - cost_of(r)) / (1 - forward_), kWedgeBits * lambda_) * kAboveRounding;
+    const double most =
+        std::max((to_beat - cost_of(r)) / (1 - forward_), kWedgeBits * lambda_) * kAboveRounding;
     if (n > LeafErrors::kFewProbes) {
       missed = errors_.missed(s.cell, s.plane, s.polygon, LeafErrors::kFewProbes, most / kShareOfFew);
       set_error(r, error_of(s, kShareOfFew * missed, r.noise));

@@ -12,15 +12,15 @@ namespace mapcodec {
 class ServiceMetrics {
  public:
   enum class Counter : std::uint8_t {
-    bytes_in,             ///< payload of requests
-    bytes_out,            ///< payload of answers
-    points_in,            ///< finite points of scans that were committed
-    scans_in,             ///< scans that were committed
-    tiles_out,            ///< tiles whose bytes were sent
-    tiles_not_modified,   ///< tiles that the client had
+    bytes_in,            ///< payload of requests
+    bytes_out,           ///< payload of answers
+    points_in,           ///< finite points of scans that were committed
+    scans_in,            ///< scans that were committed
+    tiles_out,           ///< tiles whose bytes were sent
+    tiles_not_modified,  ///< tiles that the client had
     commits,
     commit_failures,
-    busy,                 ///< refused because a queue was full
+    busy,  ///< refused because a queue was full
     compactions,
     compactions_stopped,  ///< gave way to traffic
     compaction_failures,

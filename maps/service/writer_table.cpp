@@ -36,8 +36,8 @@ Bytes WriterTable::write() const {
 }
 
 std::uint64_t WriterTable::last(const std::string& writer) const {
-  const auto at = std::find_if(entries_.begin(), entries_.end(),
-                               [&](const Entry& e) { return e.writer == writer; });
+  const auto at =
+      std::find_if(entries_.begin(), entries_.end(), [&](const Entry& e) { return e.writer == writer; });
   return at == entries_.end() ? 0 : at->sequence;
 }
 

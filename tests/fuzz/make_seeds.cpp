@@ -17,8 +17,8 @@
 #include "mapcodec/codec/tile_segments.hpp"
 #include "mapcodec/geometry/morton.hpp"
 #include "maps/map_writer.hpp"
-#include "tests/fuzz/file_seeds.hpp"
 #include "slam_adapter/octomap/octree_file.hpp"
+#include "tests/fuzz/file_seeds.hpp"
 #include "tests/fuzz/seeds.hpp"
 #include "tests/unit/occupancy_support.hpp"
 

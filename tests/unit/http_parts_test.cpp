@@ -7,8 +7,8 @@
 
 #include "tools/mapcodecd/http/conditional.hpp"
 #include "tools/mapcodecd/http/http_answer.hpp"
-#include "tools/mapcodecd/request_record.hpp"
 #include "tools/mapcodecd/http/tile_path.hpp"
+#include "tools/mapcodecd/request_record.hpp"
 
 namespace mapcodec::daemon {
 namespace {

@@ -5,7 +5,6 @@
 #include <set>
 
 #include "maps/service/map_service.hpp"
-#include "maps/service/map_service.hpp"
 #include "maps/service/token_access.hpp"
 #include "maps/service/token_secret.hpp"
 

@@ -51,8 +51,9 @@ struct BenchSettings {
 /// (update.json, update.md). `quick`: a map of 5 instead of 50 million points.
 [[nodiscard]] Status bench_update(const BenchSettings& settings);
 
-/// Octrees (.bt, .ot) and OctoMap's scan.dat: size beside zstd, time beside OctoMap, leaf by leaf the same, and a box
-/// out of a large map (octomap.json, octomap.md). Errors: also PromiseBroken (a leaf differs); Unsupported (no OctoMap).
+/// Octrees (.bt, .ot) and OctoMap's scan.dat: size beside zstd, time beside OctoMap, leaf by leaf the same,
+/// and a box out of a large map (octomap.json, octomap.md). Errors: also PromiseBroken (a leaf differs);
+/// Unsupported (no OctoMap).
 [[nodiscard]] Status bench_octomap(const BenchSettings& settings);
 /// A mapcodecd under load: tiles beside a bare gRPC stream, copies that follow, writers and readers, memory
 /// over minutes (service.json, service.md, service_soak.png). There where the service is built.

@@ -28,7 +28,7 @@ struct GrpcSettings {
   std::uint32_t max_streams_per_connection = 64;
   std::uint64_t stream_window_points = std::uint64_t{1} << 19;  ///< of one Insert stream, not yet committed
   double idle_stream_s = 60;                                    ///< an Insert stream that sends nothing ends
-  double idle_connection_s = 300;  ///< a connection without a call ends
+  double idle_connection_s = 300;                               ///< a connection without a call ends
   double handshake_s = 5;
   unsigned workers = 4;             ///< threads for calls that wait or decode
   std::size_t waiting_calls = 256;  ///< for a worker; more are told Busy

@@ -36,12 +36,17 @@ struct Bench {
   Status (*run)(const BenchSettings&);
   std::vector<std::string> reports;  ///< besides its own name
 };
-const std::vector<Bench> kBenches{{"formats", bench_formats, {}}, {"local", bench_local, {}},
+const std::vector<Bench> kBenches{{"formats", bench_formats, {}},
+                                  {"local", bench_local, {}},
                                   {"mrpt", bench_mrpt, {}},
-                                  {"octomap", bench_octomap, {}}, {"paper", bench_paper, {}},
-                                  {"rate", bench_rate, {}},       {"scaling", bench_scaling, {}},
-                                  {"seams", bench_seams, {}},     {"service", bench_service, {}},
-                                  {"surface", bench_surface, {}}, {"tiles", bench_tiles, {"seams", "local"}},
+                                  {"octomap", bench_octomap, {}},
+                                  {"paper", bench_paper, {}},
+                                  {"rate", bench_rate, {}},
+                                  {"scaling", bench_scaling, {}},
+                                  {"seams", bench_seams, {}},
+                                  {"service", bench_service, {}},
+                                  {"surface", bench_surface, {}},
+                                  {"tiles", bench_tiles, {"seams", "local"}},
                                   {"update", bench_update, {}}};
 
 std::vector<std::string> bench_names() {

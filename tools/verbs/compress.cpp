@@ -175,7 +175,7 @@ int run(Arguments& a) {
   if (const Status s = complete(a); !s.ok()) return fail("compress", s.error());
   a.options.progress = progress_printer(a.progress);
   const auto report = is_remote(a.output) ? compress_remote(a.inputs, a.output, a.options)
-                                             : compress_files(a.inputs, a.output, a.options);
+                                          : compress_files(a.inputs, a.output, a.options);
   a.options.progress = {};
   if (!report.ok()) {
     const bool output = report.error().code == ErrorCode::kCannotWrite;

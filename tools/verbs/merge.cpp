@@ -25,7 +25,7 @@ int run(Arguments& a) {
   a.request.timestamp_s = commit_time();
   std::vector<std::string> warnings;
   const auto report = is_remote(a.map) ? merge_remote(a.map, a.request, warnings)
-                                         : merge_maps(a.map, a.request, arena, warnings);
+                                       : merge_maps(a.map, a.request, arena, warnings);
   if (!report.ok()) return fail(a.map, report.error());
   print_change(a.map, *report, warnings,
                std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count(), a.json);

@@ -57,7 +57,7 @@ int run(Arguments& a) {
   Arena arena(a.threads);
   std::vector<std::string> warnings;
   const auto report = is_remote(a.map) ? update_remote(a.map, a.request, warnings)
-                                         : update_files(a.map, a.request, arena, warnings);
+                                       : update_files(a.map, a.request, arena, warnings);
   if (!report.ok()) return fail(a.map, report.error());
   print_change(a.map, *report, warnings,
                std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count(), a.json);
