@@ -15,6 +15,7 @@
 #include <mrpt/obs/CActionRobotMovement3D.h>
 #include <mrpt/obs/CObservation3DRangeScan.h>
 #include <mrpt/obs/CObservationOdometry.h>
+#include <mrpt/obs/CObservationPointCloud.h>
 #include <mrpt/obs/CObservationRobotPose.h>
 #include <mrpt/obs/CRawlog.h>
 #include <mrpt/obs/registerAllClasses.h>
@@ -60,6 +61,8 @@ class Reading {
     }
     if (const auto* image = dynamic_cast<const mrpt::obs::CObservation3DRangeScan*>(&o)) {
       insert_image(*image, pose);
+    } else if (const auto* cloud = dynamic_cast<const mrpt::obs::CObservationPointCloud*>(&o)) {
+      insert_cloud(*cloud, pose);
     } else if (points_.insertObservation(o, pose)) {
       ++observations_;
     }
@@ -152,6 +155,13 @@ class Reading {
     Points projected;
     const_cast<mrpt::obs::CObservation3DRangeScan&>(o).unprojectInto(projected, projection);
     points_.insertAnotherMap(&projected, CPose3D());
+    ++observations_;
+  }
+
+  /// MRPT 2.5.8's insertObservation leaves out the pose of the robot for this class.
+  void insert_cloud(const mrpt::obs::CObservationPointCloud& o, const CPose3D& pose) {
+    if (!o.pointcloud) return;
+    points_.insertAnotherMap(o.pointcloud.get(), pose + o.sensorPose);
     ++observations_;
   }
 
