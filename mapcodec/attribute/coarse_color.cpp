@@ -7,6 +7,7 @@
 #include "mapcodec/attribute/color_symbols.hpp"
 #include "mapcodec/attribute/symbol_side.hpp"
 #include "mapcodec/base/byte_writer.hpp"
+#include "mapcodec/entropy/cost_meter.hpp"
 
 namespace mapcodec {
 namespace {
@@ -17,31 +18,6 @@ constexpr std::int64_t kMostSymbol = 0xffffff;
 constexpr double kLevel = 1 << kColorFraction;
 /// Squared lengths of R + G + B, R - B, R - 2 G + B.
 constexpr std::array<double, 3> kLength2{3, 2, 6};
-
-/// In place of a SymbolWriter: what symbols would cost.
-class ColorMeter {
- public:
-  bool bit(bool v, BitModel& m) {
-    const std::uint32_t p = m.probability();
-    bits_ += kCost[(v ? p : 65536 - p) >> 5];
-    return v;
-  }
-  std::uint64_t raw(std::uint64_t v, int count) {
-    bits_ += count;
-    return v;
-  }
-  [[nodiscard]] double bits() const { return bits_; }
-
- private:
-  static const std::array<float, 2049> kCost;
-  double bits_ = 0;
-};
-const std::array<float, 2049> ColorMeter::kCost = [] {
-  std::array<float, 2049> t{};
-  for (std::size_t i = 0; i < t.size(); ++i)
-    t[i] = static_cast<float>(-std::log2((double(i) + 0.5) / 2048.5));
-  return t;
-}();
 
 /// Sums of aims and weights over any run of points.
 class AimSums {
@@ -155,7 +131,7 @@ class WeighingPolicy {
   }
 
   [[nodiscard]] double cost(const SplitContext& context, const Symbols& q) {
-    ColorMeter meter;
+    CostMeter meter;
     code_split(meter, *models_, context, q);
     double sum = price_ * meter.bits();
     for (std::size_t c = 0; c < 3; ++c) {

@@ -32,18 +32,6 @@ class HashedModels {
   return std::clamp(static_cast<unsigned>(std::bit_width(symbols)), 8u, most);
 }
 
-/// Codes a bit with the mixture of three contexts and teaches all.
-template <class Side>
-bool code_mixed(Side& side, bool known, BitModel& a, BitModel& b, BitModel& c, LogisticMixer& mixer) {
-  const LogisticMixer::Mixed mixed = mixer.predict(a, b, c);
-  const bool bit = side.bit(known, mixed.probability);
-  mixer.update(mixed, bit);
-  a.update(bit);
-  b.update(bit);
-  c.update(bit);
-  return bit;
-}
-
 /// Which children nodes have.
 class StructureModel {
  public:

@@ -62,7 +62,8 @@ class Model {
     if (node.single) {
       mask = code_single(side, around, mask);
     } else {
-      mask = mode_.mixing ? code_mixed(side, node, around, mask) : code_plain(side, around, mask);
+      mask = mode_.mixing ? code_children_mixed(side, node, around, mask)
+                          : code_children_plain(side, around, mask);
     }
     for (std::size_t axis = 0; axis < 3; ++axis) slab_[axis][node.at[axis]] = kHalves[axis][mask];
     return mask;
@@ -144,7 +145,7 @@ class Model {
   // `history` is a 1 followed by the bits coded so far. Seven zeros make the eighth bit a 1. The contexts of
   // both values of a bit are fetched before it is known: a decoder then waits for its arithmetic alone, which
   // a local copy of the side keeps in registers.
-  std::uint32_t code_plain(Side& shared, const Around& around, std::uint32_t known) {
+  std::uint32_t code_children_plain(Side& shared, const Around& around, std::uint32_t known) {
     Side side = shared;
     std::uint64_t touch = touches(around);
     BitModel* model = &occupancy_[(touch & 0xff) * kHistories + 1];
@@ -174,7 +175,7 @@ class Model {
     return mask;
   }
 
-  std::uint32_t code_mixed(Side& side, const Node& node, const Around& around, std::uint32_t known) {
+  std::uint32_t code_children_mixed(Side& side, const Node& node, const Around& around, std::uint32_t known) {
     std::uint64_t touch = touches(around);
     std::uint64_t slab = kSlabWord[around.slab[0] | around.slab[1] << 2 | around.slab[2] << 4];
     const std::uint32_t size = (node.siblings == 0 ? 0u : node.siblings - 1u) * 8 + std::min(below_, 8u) - 1;
@@ -185,21 +186,11 @@ class Model {
       BitModel& a = occupancy_[(touch & 0xff) * kHistories + history];
       BitModel& b = by_slab_[history * 8 + (slab & 7)];
       BitModel& c = by_size_[history * 64 + size];
-      const bool bit = code_from_three(side, (known >> i & 1) != 0, a, b, c, mixers_[i]);
+      const bool bit = code_mixed(side, (known >> i & 1) != 0, a, b, c, mixers_[i]);
       history = 2 * history + bit;
       mask |= std::uint32_t{bit} << i;
     }
     return mask;
-  }
-
-  bool code_from_three(Side& side, bool known, BitModel& a, BitModel& b, BitModel& c, LogisticMixer& mixer) {
-    const LogisticMixer::Mixed mixed = mixer.predict(a, b, c);
-    const bool bit = side.bit(known, mixed.probability);
-    mixer.update(mixed, bit);
-    a.update(bit);
-    b.update(bit);
-    c.update(bit);
-    return bit;
   }
 
   struct CountContext {

@@ -5,13 +5,6 @@
 
 namespace mapcodec::surface {
 
-const std::array<float, 1025> CostMeter::kCost = [] {
-  std::array<float, 1025> t{};
-  for (std::size_t i = 0; i < t.size(); ++i)
-    t[i] = static_cast<float>(-std::log2((double(i) + 0.5) / 1024.5));
-  return t;
-}();
-
 double Prices::no_plane(const CellContext& c, bool inherits) const {
   CostMeter meter;
   models_.own_plane(meter, false, c, inherits);

@@ -5,27 +5,9 @@
 #include "mapcodec/codec/surface_cell.hpp"
 #include "mapcodec/codec/surface_model.hpp"
 #include "mapcodec/codec/surface_walk.hpp"
+#include "mapcodec/entropy/cost_meter.hpp"
 
 namespace mapcodec::surface {
-
-/// A "side" of the code that only counts what symbols would cost [bits].
-class CostMeter {
- public:
-  bool bit(bool v, const BitModel& m) {
-    const std::uint32_t p = v ? m.probability() : 65536 - m.probability();
-    bits_ += kCost[p >> 6];
-    return v;
-  }
-  std::uint64_t raw(std::uint64_t v, int count) {
-    bits_ += count;
-    return v;
-  }
-  [[nodiscard]] double bits() const { return bits_; }
-
- private:
-  static const std::array<float, 1025> kCost;
-  double bits_ = 0;
-};
 
 /// What a cell's plane is to it.
 enum class PlaneState : int { none = 0, inherited = 1, own = 2 };

@@ -103,4 +103,17 @@ class LogisticMixer {
   std::array<std::int32_t, 3> weight_{26214, 19661, 19661};  // 0.4, 0.3, 0.3
 };
 
+/// Codes a bit with the mixture of three contexts and teaches all.
+/// @param side   writes `known`, or reads the bit (then `known` is not looked at).
+template <class Side>
+bool code_mixed(Side& side, bool known, BitModel& a, BitModel& b, BitModel& c, LogisticMixer& mixer) {
+  const LogisticMixer::Mixed mixed = mixer.predict(a, b, c);
+  const bool bit = side.bit(known, mixed.probability);
+  mixer.update(mixed, bit);
+  a.update(bit);
+  b.update(bit);
+  c.update(bit);
+  return bit;
+}
+
 }  // namespace mapcodec

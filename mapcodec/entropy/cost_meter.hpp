@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What symbols would cost, without writing them. For encoders: the doubles in it decide no bit of a decoder.
+#pragma once
+
+#include <array>
+#include <cmath>
+
+#include "mapcodec/entropy/bit_model.hpp"
+
+namespace mapcodec {
+
+/// A "side" of the code that only counts [bits]. Models stay as they are.
+class CostMeter {
+ public:
+  bool bit(bool v, const BitModel& m) {
+    const std::uint32_t p = v ? m.probability() : 65536 - m.probability();
+    bits_ += kCost[p >> 6];
+    return v;
+  }
+  std::uint64_t raw(std::uint64_t v, int count) {
+    bits_ += count;
+    return v;
+  }
+  [[nodiscard]] double bits() const { return bits_; }
+
+ private:
+  inline static const std::array<float, 1025> kCost = [] {
+    std::array<float, 1025> t{};
+    for (std::size_t i = 0; i < t.size(); ++i)
+      t[i] = static_cast<float>(-std::log2((double(i) + 0.5) / 1024.5));
+    return t;
+  }();
+  double bits_ = 0;
+};
+
+}  // namespace mapcodec
