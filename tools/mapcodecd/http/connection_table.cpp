@@ -37,12 +37,13 @@ Connection* ConnectionTable::next() {
   return connection;
 }
 
-void ConnectionTable::rest(Connection& connection) {
+void ConnectionTable::rest(Connection& connection, const std::function<void(int fd)>& wait) {
   const std::lock_guard lock(mutex_);
   Entry& entry = entries_.at(connection.fd());
   entry.resting = true;
   entry.since = std::chrono::steady_clock::now();
   --working_;
+  wait(connection.fd());
 }
 
 void ConnectionTable::end(Connection& connection) {

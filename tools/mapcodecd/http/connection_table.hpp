@@ -4,6 +4,7 @@
 
 #include <condition_variable>
 #include <deque>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <unordered_map>
@@ -24,7 +25,9 @@ class ConnectionTable {
   /// The next that waits; nullptr once closed. Waits.
   [[nodiscard]] Connection* next();
   /// A worker gives it back: it rests until its deadline, and must not be touched any more.
-  void rest(Connection& connection);
+  /// @param wait  has its socket waited for; called while it cannot end, so that the socket's number is still
+  /// its own.
+  void rest(Connection& connection, const std::function<void(int fd)>& wait);
   /// A worker ends it.
   void end(Connection& connection);
   /// Ends those that rested beyond their deadline. @return how many.

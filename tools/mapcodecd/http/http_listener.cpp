@@ -217,10 +217,7 @@ void HttpListener::Impl::park(Connection& connection, std::uint32_t events) {
     ++timed_out;
     return table.end(connection);
   }
-  const int fd = connection.fd();
-  table.rest(connection);
-  // From here on it may be gone, and its number another's: then this wakes that one for nothing.
-  (void)watch(fd, events | EPOLLONESHOT, EPOLL_CTL_MOD).ok();
+  table.rest(connection, [&](int fd) { (void)watch(fd, events | EPOLLONESHOT, EPOLL_CTL_MOD).ok(); });
 }
 
 HttpListener::HttpListener(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
