@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What the daemon refuses: strangers, wrong certificates, tricks, too much, too many, and lies.
 
-MAPCODEC_CONNECTIONS=10000 opens as many connections (both ends count against their process's file limit)."""
+MAPCODEC_CONNECTIONS=10000 opens as many connections (both ends count against their process's file limit);
+MAPCODEC_FUZZ_SECONDS=600 sends malformed messages for so long, beside the 150 of every run."""
 import http.client
 import os
 import random
@@ -25,6 +26,7 @@ from certificates import Authority
 from daemon import DAEMON, Daemon, DaemonTest, fetch, insert, opening, pb, rpc, scan, scan_of
 
 CONNECTIONS = int(os.environ.get("MAPCODEC_CONNECTIONS", "1500"))
+FUZZ_SECONDS = float(os.environ.get("MAPCODEC_FUZZ_SECONDS", "0"))
 READ, WRITE, ADMIN = "read", "write", "admin"
 
 
@@ -339,6 +341,18 @@ class Frames:
         return out
 
 
+def mutated(rng, seed):
+    """Some bytes of `seed` changed, its end cut off or lengthened."""
+    raw = bytearray(seed)
+    for _ in range(rng.randrange(6)):
+        raw[rng.randrange(len(raw))] = rng.randrange(256)
+    if rng.random() < 0.3:
+        raw = raw[:rng.randrange(len(raw) + 1)]
+    if rng.random() < 0.3:
+        raw += bytes(rng.randrange(256) for _ in range(rng.randrange(20)))
+    return bytes(raw)
+
+
 class TooMuch(SecureTest):
     config = '[http]\nmax_connections = 300\n[grpc]\nmax_connections = 400\nmemory_bytes = 67108864\nhandshake_s = 2.0\n[limits]\nrequests_per_s = 0.0\n'
 
@@ -459,22 +473,30 @@ class TooMuch(SecureTest):
     def test_malformed_protobuf(self):
         self.create()
         insert(self.stub, "m", [scan(1, scan_of(1, 100))])
-        rng = random.Random(5)
-        seeds = [pb.GetTilesRequest(map="m", box=pb.Box(min=pb.Vector(x=1), max=pb.Vector(x=2))), pb.StatsRequest(map="m"),
-                 pb.DecodeRequest(map="m"), opening("m"), scan(1, scan_of(2, 10)), pb.SetPosesRequest(map="m"), pb.DiffRequest(map="m")]
-        methods = [m.name for m in pb.DESCRIPTOR.services_by_name["MapService"].methods if m.name != "Watch"]
+        pose = pb.Pose(translation=pb.Vector(x=1), qw=1)
+        seeds = [pb.GetTilesRequest(map="m", box=pb.Box(min=pb.Vector(x=1), max=pb.Vector(x=2))),
+                 pb.GetTilesRequest(map="m", pose=pose, radius=3, coarse_level=3, if_none_match=bytes(16), have_segments=bytes(32)),
+                 pb.GetTilesRequest(map="m", keys=[pb.TileKey(x=1), pb.TileKey(y=-1, level=2)]), pb.StatsRequest(map="m"),
+                 pb.DecodeRequest(map="m", level=2, origin=pb.Vector(x=1)), opening("m"), opening("m", "robot", 1), scan(1, scan_of(2, 10)),
+                 scan(2, scan_of(3, 4), submap="s", T_map_submap=pose, T_submap_scan=pose),
+                 pb.SetPosesRequest(map="m", poses=[pb.SetPosesRequest.SubmapPose(submap="s", T_map_submap=pose)]),
+                 pb.DiffRequest(map="m", **{"from": "1", "to": "2"}), pb.CreateMapRequest(map="n", promise_m=0.1)]
+        seeds = [seed.SerializeToString() for seed in seeds]
+        methods = [m.name for m in pb.DESCRIPTOR.services_by_name["MapService"].methods if m.name not in ("Watch", "DeleteMap")]
         channel = self.daemon.channel()
-        for round_ in range(150):
-            raw = bytearray(rng.choice(seeds).SerializeToString())
-            for _ in range(rng.randrange(1, 6)):
-                raw[rng.randrange(len(raw))] = rng.randrange(256)
-            raw = bytes(raw[:rng.randrange(len(raw) + 1)]) + bytes(rng.randrange(256) for _ in range(rng.randrange(20)))
+        rng = random.Random(5)
+        end, rounds = time.monotonic() + FUZZ_SECONDS, 0
+        while rounds < 150 or time.monotonic() < end:
+            rounds += 1
+            messages = [mutated(rng, rng.choice(seeds)) for _ in range(rng.randrange(1, 4))]
             call = channel.stream_stream(f"/mapcodec.v1.MapService/{rng.choice(methods)}", lambda b: b, lambda b: b)
             try:
-                for _ in call(iter([raw, raw]), timeout=5):
+                for _ in call(iter(messages), timeout=20):
                     pass
             except grpc.RpcError as e:
-                self.assertNotEqual(e.code(), grpc.StatusCode.UNAVAILABLE, raw)
+                self.assertNotIn(e.code(), (grpc.StatusCode.UNAVAILABLE, grpc.StatusCode.INTERNAL), (messages, e.details()))
+        if FUZZ_SECONDS:
+            print(f"{rounds} calls with malformed messages")
         channel.close()
         self.assertEqual(self.daemon.process.poll(), None)
         self.stub.ListMaps(pb.ListMapsRequest(), timeout=20)
