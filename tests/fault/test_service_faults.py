@@ -148,6 +148,50 @@ class Faults(unittest.TestCase):
         verified = subprocess.run([PROGRAM, "verify", self.data / "m.mapc"], capture_output=True, text=True)
         self.assertEqual(verified.returncode, 0, verified.stderr)
 
+    def small_disk(self):
+        """A file system of its own, and a file that fills most of it."""
+        disk = self.folder / "disk"
+        disk.mkdir()
+        mounted = subprocess.run(["mount", "-t", "tmpfs", "-o", "size=8M", "none", disk], capture_output=True)
+        if mounted.returncode != 0:
+            self.skipTest("a file system cannot be mounted here")
+        self.addCleanup(subprocess.run, ["umount", "--lazy", disk], check=True)
+        return disk
+
+    def test_full_file_system(self):
+        disk = self.small_disk()
+        self.data = disk / "maps"
+        self.data.mkdir()
+        daemon = Daemon(self.data)
+        self.addCleanup(daemon.kill)
+        stub = self.create(daemon)
+        send = lambda k: list(stub.Insert(iter([opening("m", "r"), scan(k, scan_of(k, 20000))]), timeout=60))  # noqa: E731
+        send(1)
+        filler = disk / "filler"
+        with self.assertRaises(OSError), open(filler, "wb", buffering=0) as f:
+            while f.write(bytes(4096)):
+                pass
+        for _ in range(3):
+            for call in (lambda: send(2), lambda: stub.Compact(pb.CompactRequest(map="m"), timeout=60),
+                         lambda: stub.CreateMap(pb.CreateMapRequest(map="n", promise=pb.CreateMapRequest.LOSSLESS), timeout=60)):
+                with self.assertRaises(grpc.RpcError) as caught:
+                    call()
+                self.assertEqual(caught.exception.code(), grpc.StatusCode.RESOURCE_EXHAUSTED, caught.exception.details())
+                self.assertRegex(caught.exception.details(), "space")
+            facts, tiles = fetch(stub, map="m")
+            self.assertEqual((facts.revision, sum(t[0].points for t in tiles)), (2, 20000))
+        filler.unlink()
+        send(2)
+        self.create_another(stub)
+        self.assertEqual(stub.Stats(pb.StatsRequest(map="m"), timeout=60).map.points, 40000)
+        self.assertEqual(daemon.stop(), 0)
+        verified = subprocess.run([PROGRAM, "verify", self.data / "m.mapc"], capture_output=True, text=True)
+        self.assertEqual(verified.returncode, 0, verified.stderr)
+
+    @staticmethod
+    def create_another(stub):
+        stub.CreateMap(pb.CreateMapRequest(map="n", promise=pb.CreateMapRequest.LOSSLESS), timeout=60)
+
 
 if __name__ == "__main__":
     unittest.main()
