@@ -23,19 +23,21 @@ double cost(const EncodedTile& t, double step_m) {
 }
 
 Result<EncodedTile> encode_as(CodecId codec, double step_m, const PointCloud& tile, const MapSchema& schema,
-                              const CodingPlan& plan) {
+                              const CodingPlan& plan, TileMemo* memo = nullptr) {
   TileSettings settings = plan.tiles;
   settings.codec = codec;
   settings.step_m = step_m;
-  return encode_tile(tile, schema, settings);
+  return encode_tile(tile, schema, settings, memo);
 }
 
-Result<EncodedTile> encode_cheapest(const PointCloud& tile, const MapSchema& schema, const CodingPlan& plan) {
+Result<EncodedTile> encode_cheapest(const PointCloud& tile, const MapSchema& schema, const CodingPlan& plan,
+                                    TileMemo* memo) {
   const double voxel_m = plan.voxel_steps * plan.step_m;
   if (plan.fixed) {
-    return encode_as(*plan.fixed, plan.fixed == CodecId::surface ? plan.step_m : voxel_m, tile, schema, plan);
+    return encode_as(*plan.fixed, plan.fixed == CodecId::surface ? plan.step_m : voxel_m, tile, schema, plan,
+                     memo);
   }
-  auto surface = encode_as(CodecId::surface, plan.step_m, tile, schema, plan);
+  auto surface = encode_as(CodecId::surface, plan.step_m, tile, schema, plan, memo);
   // Too wide at this step, or too far away: points have more room.
   if (!surface.ok()) return encode_as(CodecId::points, voxel_m, tile, schema, plan);
   if (geometry_bits(*surface) < kClearlySurface * static_cast<double>(tile.size())) return surface;
@@ -46,12 +48,13 @@ Result<EncodedTile> encode_cheapest(const PointCloud& tile, const MapSchema& sch
 
 }  // namespace
 
-Result<EncodedTile> encode_by_plan(const PointCloud& tile, const MapSchema& schema, const CodingPlan& plan) {
+Result<EncodedTile> encode_by_plan(const PointCloud& tile, const MapSchema& schema, const CodingPlan& plan,
+                                   TileMemo* memo) {
   switch (plan.choice) {
     case CodecChoice::cheapest:
-      return encode_cheapest(tile, schema, plan);
+      return encode_cheapest(tile, schema, plan, memo);
     case CodecChoice::surface:
-      return encode_as(CodecId::surface, plan.step_m, tile, schema, plan);
+      return encode_as(CodecId::surface, plan.step_m, tile, schema, plan, memo);
     case CodecChoice::points:
       break;
   }

@@ -25,8 +25,9 @@ struct CodingPlan {
 
 /// Encodes a tile by the plan, by the cheapest codec where there is a choice. Pure, as encode_tile. A tile
 /// too wide for surfaces at this step is coded as points. Errors: those of encode_tile.
+/// @param memo  of this tile, as for encode_tile.
 [[nodiscard]] Result<EncodedTile> encode_by_plan(const PointCloud& tile, const MapSchema& schema,
-                                                 const CodingPlan& plan);
+                                                 const CodingPlan& plan, TileMemo* memo = nullptr);
 
 /// Whole-map figures from those of the tiles: sums weighted by points, so that no tile has to be looked at
 /// again.

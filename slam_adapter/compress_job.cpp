@@ -38,6 +38,8 @@ constexpr double kColorExponent = 0.22, kColorLeap = 2;
 // What nobody asked for shall not come nearer than this to the least error that positions allow.
 constexpr double kAboveLeast = 1.2;
 constexpr int kColorTries = 4;
+// Of the memory budget: for what codings of the same positions have in common.
+constexpr std::uint64_t kMemoryShare = 8;
 
 using Clock = std::chrono::steady_clock;
 
@@ -145,7 +147,7 @@ double CompressJob::smallest_step() const {
 }
 
 Status CompressJob::encode_until_kept() {
-  constexpr int kTries = 12;
+  constexpr int kTries = 16;
   for (int i = 0;; ++i) {
     auto at = Clock::now();
     MAPCODEC_TRY(encode_once());
@@ -167,19 +169,17 @@ Status CompressJob::encode_until_kept() {
 /// What was measured on the sample may be off for the whole map: then the step is changed.
 bool CompressJob::is_kept_or_adjust() {
   if (has_target()) return meets_target_or_adjust();
-  const auto color = bounded_color();
-  const bool colored = color_slope_ > 0 && color;
-  const ColorState state = colored ? adjust_map_color(schema_.channels[*color].bound) : ColorState::met;
-  if (state == ColorState::finer_positions) return false;
-  if (schema_.promise == PromiseKind::rms && !meets_rms_or_adjust()) {
-    color_secant_.reset();  // other positions, other errors
+  const bool by_slope = has_color_slope();
+  if (!by_slope || !positions_found_) {
+    const bool kept = schema_.promise != PromiseKind::rms || meets_rms_or_adjust();
+    if (!by_slope) return kept && meets_color_or_adjust();
+    positions_found_ = kept || !choice_.plan.has_surfaces();
     return false;
   }
-  if (colored && choice_.plan.has_surfaces()) {
-    color_tries_ += state == ColorState::missed;
-    return state == ColorState::met;
-  }
-  return meets_color_or_adjust();
+  const ColorState state = adjust_map_color(schema_.channels[*bounded_color()].bound);
+  if (state == ColorState::finer_positions) positions_found_ = false;
+  color_tries_ += state == ColorState::missed;
+  return state == ColorState::met;
 }
 
 bool CompressJob::meets_rms_or_adjust() {
@@ -330,9 +330,21 @@ Status CompressJob::encode_once() {
   if (is_coded()) return store_coded();
   MapSchema target = schema_;
   if (const auto color = bounded_color()) target.channels[*color].bound *= color_target_;
-  return encode_tiles(
+  // Only where the positions lie shows what colours cost there.
+  const bool positions_only = has_color_slope() && !positions_found_;
+  if (positions_only) target = positions_alone(target);
+  if (positions_only) memory_.begin(memory_budget(options_) / kMemoryShare);
+  MAPCODEC_TRY(encode_tiles(
       *tiles_, [&](const PointCloud& tile) { return encode(tile, target); }, pipeline,
-      [this](const TileKey& key, EncodedTile&& t) { return store(key, std::move(t)); });
+      [this](const TileKey& key, EncodedTile&& t) { return store(key, std::move(t)); }));
+  add_saved_seconds();
+  return {};
+}
+
+/// What a tile's coding takes is told as if nothing had been remembered.
+void CompressJob::add_saved_seconds() {
+  for (std::size_t i = 0; i < report_.tile_seconds.size(); ++i)
+    report_.tile_seconds[i] += memory_.seconds_saved(tiles_->tiles()[i].key);
 }
 
 /// Whether the search has coded the whole map already: positions are all of it, and it was not coded since.
@@ -354,14 +366,15 @@ Status CompressJob::store_coded() {
 
 /// Later codings keep to the codecs of the first: with a little other step some tiles would change over, and
 /// the error of the map would leap to the other side of the promise.
-Result<EncodedTile> CompressJob::encode(const PointCloud& tile, const MapSchema& target) const {
+Result<EncodedTile> CompressJob::encode(const PointCloud& tile, const MapSchema& target) {
   CodingPlan plan = choice_.plan;
+  const auto key = plan_.tile_of(tile.xyz.front());
   if (plan.choice == CodecChoice::cheapest && report_.codings > 0) {
-    const auto key = plan_.tile_of(tile.xyz.front());
     const auto known = key ? codecs_.find(*key) : codecs_.end();
     if (known != codecs_.end()) plan.fixed = known->second;
   }
-  return encode_by_plan(tile, target, plan);
+  return key && has_color_slope() ? memory_.encode(*key, tile, target, plan)
+                                  : encode_by_plan(tile, target, plan);
 }
 
 Status CompressJob::store(const TileKey& key, EncodedTile&& t) {

@@ -10,6 +10,7 @@
 #include "parallel/arena.hpp"
 #include "parallel/survey.hpp"
 #include "parallel/tile_set.hpp"
+#include "slam_adapter/coding_memory.hpp"
 #include "slam_adapter/compress.hpp"
 #include "slam_adapter/level_errors.hpp"
 #include "slam_adapter/log_secant.hpp"
@@ -34,7 +35,8 @@ class CompressJob {
   [[nodiscard]] double smallest_step() const;
   [[nodiscard]] Status encode_until_kept();
   [[nodiscard]] Status encode_once();
-  [[nodiscard]] Result<EncodedTile> encode(const PointCloud& tile, const MapSchema& target) const;
+  [[nodiscard]] Result<EncodedTile> encode(const PointCloud& tile, const MapSchema& target);
+  void add_saved_seconds();
   [[nodiscard]] bool is_coded() const;
   [[nodiscard]] Status store_coded();
   [[nodiscard]] Status store(const TileKey& key, EncodedTile&& t);
@@ -42,6 +44,10 @@ class CompressJob {
 
   [[nodiscard]] bool has_target() const { return options_.target_bits_per_point || options_.target_ratio; }
   [[nodiscard]] std::optional<std::size_t> bounded_color() const;
+  /// Colours of surface tiles are coded to a slope of the whole map.
+  [[nodiscard]] bool has_color_slope() const {
+    return color_slope_ > 0 && choice_.plan.has_surfaces() && bounded_color().has_value();
+  }
   bool is_kept_or_adjust();
   bool meets_target_or_adjust();
   bool meets_rms_or_adjust();
@@ -72,7 +78,9 @@ class CompressJob {
   std::optional<LogSecant> secant_;              // over the codings of the whole map
   int target_tries_ = 0, rms_tries_ = 0, color_tries_ = 0;
   std::optional<LogSecant> color_secant_;
-  double color_slope_ = 0;   // of surface tiles, the same for all; 0: each meets the bound
+  double color_slope_ = 0;        // of surface tiles, the same for all; 0: each meets the bound
+  bool positions_found_ = false;  // until then colours are not coded where they follow a slope
+  CodingMemory memory_;
   double color_target_ = 1;  // share of the colour bound that tiles aim at
   CompressReport report_;
 };

@@ -102,8 +102,13 @@ class Chooser {
       best.emplace(f);
     };
     if (!clear) {
-      Found surface{{}, search(schema_)};
-      MAPCODEC_ASSIGN(surface.plan, surface.search.for_rms(plan_with(CodecChoice::surface), rms_m));
+      // Where no tile ever took points, surfaces alone would go the same way.
+      Found surface = mixed.search.surfaces_alone() ? mixed : Found{{}, search(schema_)};
+      if (mixed.search.surfaces_alone()) {
+        surface.plan.choice = CodecChoice::surface;
+      } else {
+        MAPCODEC_ASSIGN(surface.plan, surface.search.for_rms(plan_with(CodecChoice::surface), rms_m));
+      }
       consider(surface);
     }
     if (share > 0 && !(mixed.search.leapt() && sample_.pieces.size() == 1)) consider(mixed);

@@ -89,6 +89,7 @@ Status RateSearch::seek_on(const TileSample& sample, CodingPlan& plan, const Map
     MapSchema with_step = schema;
     with_step.step_m = plan.step_m;
     MAPCODEC_ASSIGN(found_, encode_sample(sample, with_step, trial, arena_, stop_, &coded));
+    surfaces_alone_ = surfaces_alone_ && found_.surface_share() == 1;
     const double got = (found_.*value)();
     if (for_good && got <= target / kRmsAim) smallest.take_if_smaller(plan.step_m, found_, std::move(coded));
     if (for_good && is_kept(i, got / target)) {

@@ -31,6 +31,8 @@ class RateSearch {
   [[nodiscard]] const CodedSum& found() const { return found_; }
   /// Whether its value leaps across the target, so that the plan is on one side of it.
   [[nodiscard]] bool leapt() const { return leapt_; }
+  /// No tile of any try took points.
+  [[nodiscard]] bool surfaces_alone() const { return surfaces_alone_; }
   /// Bits per point for positions that it expects of its plan.
   [[nodiscard]] double expected_bits() const { return expected_bits_; }
   /// By how much the logarithm of the RMS grows with that of the step, near the last search's end.
@@ -55,7 +57,7 @@ class RateSearch {
 
   CodedSum found_;
   std::optional<CodedTiles> coded_;
-  bool leapt_ = false;
+  bool leapt_ = false, surfaces_alone_ = true;
   double expected_bits_ = 0;
   double rms_slope_ = 1, bits_slope_ = 1;
 };

@@ -96,30 +96,32 @@ struct OnVoxels {
   double floor;                      ///< error if these were kept exactly
 };
 
-class ColorSearch {
+}  // namespace
+
+class SurfaceColorEncoder::Search {
  public:
-  ColorSearch(const ChannelSchema& channel, const Channel& original, const NearestPair& near,
-              const SamePositions& ties, const SurfaceEncoding& encoding, Effort effort)
-      : channel_(channel),
-        original_(original),
+  Search(Channel original, const NearestPair& near, const SamePositions& ties,
+         const SurfaceEncoding& encoding, Effort effort)
+      : original_(std::move(original)),
         near_(near),
         ties_(ties),
         encoding_(encoding),
         passes_(effort == Effort::fast       ? 2
                 : effort == Effort::standard ? 3
                                              : 4),
-        scale_(color_scale_of(original)),
-        comparisons_(original, scale_, near, ties) {}
+        scale_(color_scale_of(original_)),
+        comparisons_(original_, scale_, near, ties) {}
 
-  Result<SurfaceColor> run(double slope) {
-    OnVoxels on = on_voxels(surface::least_voxel_shift(encoding_.header.depth));
-    const double least = on.floor;
-    const double bound = slope > 0 ? channel_.bound : std::max(channel_.bound, kAboveLeast * least);
-    on = coarsest(std::max(kFloorShare * bound, kLeastFloor * least), std::move(on));
-    encoder_.emplace(on.sorted.voxels, original_.info, scale_);
+  SurfaceColor run(double bound, double slope) {
+    if (!on_) finest_ = on_voxels(surface::least_voxel_shift(encoding_.header.depth));
+    if (!on_) least_ = finest_->floor;
+    if (!(slope > 0)) bound = std::max(bound, kAboveLeast * least_);
+    prepare(std::max(kFloorShare * bound, kLeastFloor * least_));
+    aims_ = on_->aims;
+    first_ = true;
     usual_ = std::max(bound, 1.0);
-    SurfaceColor best = slope > 0 ? code_at(on, slope) : code_within(on, bound);
-    best.least_error = least;
+    SurfaceColor best = slope > 0 ? code_at(slope) : code_within(bound);
+    best.least_error = least_;
     return best;
   }
 
@@ -173,6 +175,17 @@ class ColorSearch {
     return color_error_between(original_, c, near_, ties_);
   }
 
+  /// Chooses the voxels, if they are not chosen for `most`.
+  void prepare(double most) {
+    if (on_ && most == most_) return;
+    if (!finest_) finest_ = on_voxels(surface::least_voxel_shift(encoding_.header.depth));
+    encoder_.reset();
+    on_.emplace(coarsest(most, std::move(*finest_)));
+    finest_.reset();
+    most_ = most;
+    encoder_.emplace(on_->sorted.voxels, original_.info, scale_);
+  }
+
   /// The coarsest voxels whose floor is at most `most`, by bisection; or the finest.
   OnVoxels coarsest(double most, OnVoxels finest) const {
     OnVoxels best = std::move(finest);
@@ -189,23 +202,22 @@ class ColorSearch {
   }
 
   /// One coding, and what it says of the next one's aims and weights.
-  SurfaceColor code(OnVoxels& on, double slope) {
+  SurfaceColor code(double slope) {
     const double step = std::sqrt(slope * usual_);
     // Weights are about two comparisons over the usual distance.
-    ColorAims& aims = on.aims;
-    if (first_) std::fill(aims.weights.begin(), aims.weights.end(), static_cast<float>(2 / usual_));
+    if (first_) std::fill(aims_.weights.begin(), aims_.weights.end(), static_cast<float>(2 / usual_));
     first_ = false;
     ChannelEncoding e = encoder_->encode(
-        aims, static_cast<std::uint32_t>(std::clamp(16 * step, 1.0, 1048576.0)), kPrice * slope);
-    SurfaceColor r{std::move(e.bytes), on.shift, error_of(e.decoded, on)};
-    learn(on, e.decoded, static_cast<float>(std::max(1.0, kAlike * r.error)));
+        aims_, static_cast<std::uint32_t>(std::clamp(16 * step, 1.0, 1048576.0)), kPrice * slope);
+    SurfaceColor r{std::move(e.bytes), on_->shift, error_of(e.decoded, *on_)};
+    learn(e.decoded, static_cast<float>(std::max(1.0, kAlike * r.error)));
     return r;
   }
 
-  void learn(OnVoxels& on, const Channel& decoded, float alike) {
+  void learn(const Channel& decoded, float alike) {
     const float unit = scale_ == ColorScale::sixteen ? 1.0f / 257 : 1.0f;
     double sum = 0;
-    for_each_voxel(on, [&](std::uint32_t begin, std::uint32_t end, std::span<const Sample> samples) {
+    for_each_voxel(*on_, [&](std::uint32_t begin, std::uint32_t end, std::span<const Sample> samples) {
       const auto v = load_rgb(decoded, begin);
       float weight = 0;
       const Rgb aim = mean_around(
@@ -214,27 +226,27 @@ class ColorSearch {
           alike, weight);
       sum += double(weight);
       for (std::uint32_t i = begin; i < end; ++i) {
-        on.aims.rgb[i] = aim;
-        on.aims.weights[i] = weight / static_cast<float>(end - begin);
+        aims_.rgb[i] = aim;
+        aims_.weights[i] = weight / static_cast<float>(end - begin);
       }
     });
-    usual_ = 2 * static_cast<double>(on.sorted.order.size()) / sum;
+    usual_ = 2 * static_cast<double>(on_->sorted.order.size()) / sum;
   }
 
-  SurfaceColor code_at(OnVoxels& on, double slope) {
-    SurfaceColor r = code(on, slope);
-    for (int i = 1; i < passes_; ++i) r = code(on, slope);
+  SurfaceColor code_at(double slope) {
+    SurfaceColor r = code(slope);
+    for (int i = 1; i < passes_; ++i) r = code(slope);
     return r;
   }
 
   /// Slopes by secants in logarithms until the error is near the bound.
-  SurfaceColor code_within(OnVoxels& on, double bound) {
+  SurfaceColor code_within(double bound) {
     constexpr int kTries = 8;
     constexpr double kAim = 0.985, kNear = 0.965, kExponent = 0.22;
     double slope = 20 * bound, low = 0, high = 0;
     std::optional<SurfaceColor> best;
     for (int i = 0; i < kTries; ++i) {
-      SurfaceColor r = code(on, slope);
+      SurfaceColor r = code(slope);
       const bool kept = r.error <= bound;
       (kept ? low : high) = slope;
       const double over = kAim * bound / std::max(r.error, 1e-3);
@@ -253,25 +265,29 @@ class ColorSearch {
     return a.error <= bound ? a.bytes.size() < b.bytes.size() : a.error < b.error;
   }
 
-  const ChannelSchema& channel_;
-  const Channel& original_;
+  const Channel original_;
   const NearestPair& near_;
   const SamePositions& ties_;
   const SurfaceEncoding& encoding_;
   int passes_;
   ColorScale scale_;
   Comparisons comparisons_;
+  std::optional<OnVoxels> finest_, on_;
+  double least_ = 0, most_ = 0;  ///< error on the finest voxels; that on_ was chosen for
   std::optional<CoarseColorEncoder> encoder_;
+  ColorAims aims_;    ///< of the next coding
   double usual_ = 1;  ///< harmonic mean of the distances
   bool first_ = true;
 };
 
-}  // namespace
+SurfaceColorEncoder::SurfaceColorEncoder(Channel original, const NearestPair& near, const SamePositions& ties,
+                                         const SurfaceEncoding& encoding, Effort effort)
+    : search_(std::make_unique<Search>(std::move(original), near, ties, encoding, effort)) {}
 
-Result<SurfaceColor> encode_surface_color(const ChannelSchema& channel, const Channel& original,
-                                          const NearestPair& near, const SamePositions& ties,
-                                          const SurfaceEncoding& encoding, Effort effort, double slope) {
-  return ColorSearch(channel, original, near, ties, encoding, effort).run(slope);
+SurfaceColorEncoder::~SurfaceColorEncoder() = default;
+
+SurfaceColor SurfaceColorEncoder::encode(double bound, double slope) {
+  return search_->run(bound, slope);
 }
 
 }  // namespace mapcodec

@@ -2,6 +2,7 @@
 #include "mapcodec/codec/surface_tile.hpp"
 
 #include <cmath>
+#include <optional>
 
 #include "mapcodec/attribute/channel_encoder.hpp"
 #include "mapcodec/codec/surface_color.hpp"
@@ -59,38 +60,56 @@ Channel on_decoded(const ChannelSchema& channel, const Channel& original, const 
   return color ? transfer_color(original, near, ties) : transfer_values(original, near.back);
 }
 
+}  // namespace
+
+/// A tile whose positions are coded and measured.
+struct TileMemo::Content {
+  double step_m = 0;
+  Effort effort = Effort::standard;
+  SurfaceEncoding encoding;
+  std::uint8_t no_voxels = 0;  ///< its voxel shift without channels
+  NearestPair near;            ///< empty where errors were only estimated
+  SurfaceTile figures;         ///< without bytes
+  std::optional<SamePositions> ties;
+  std::unique_ptr<SurfaceColorEncoder> color;
+};
+
+namespace {
+
+using Content = TileMemo::Content;
+
 class TileChannels {
  public:
-  TileChannels(const PointCloud& tile, const MapSchema& schema, const NearestPair& near, Effort effort,
-               double color_slope)
+  TileChannels(const PointCloud& tile, const MapSchema& schema, const TileSettings& settings, Content& coded)
       : tile_(tile),
         schema_(schema),
-        near_(near),
-        effort_(effort),
-        color_slope_(color_slope),
+        settings_(settings),
+        content_(coded),
         coded_(coded_channels(schema, CodecId::surface)) {}
 
   /// Colour first: it decides on the voxels.
-  Status encode(SurfaceEncoding& encoding, SurfaceTile& r) {
+  Status encode(SurfaceTile& r) {
     if (coded_.empty()) return {};
+    if (!content_.ties) content_.ties.emplace(tile_.xyz);
     r.channels.resize(coded_.size());
-    std::size_t color = coded_.size();
-    std::uint8_t shift = std::clamp(kUsualVoxelShift, surface::least_voxel_shift(encoding.header.depth),
-                                    surface::most_voxel_shift(encoding.header.depth));
-    for (std::size_t i = 0; i < coded_.size() && color == coded_.size(); ++i) {
-      if (is_bounded_color(schema_.channels[coded_[i]])) color = i;
-    }
+    const std::uint8_t depth = content_.encoding.header.depth;
+    std::uint8_t shift =
+        std::clamp(kUsualVoxelShift, surface::least_voxel_shift(depth), surface::most_voxel_shift(depth));
+    std::size_t color = 0;
+    while (color < coded_.size() && !is_bounded_color(schema_.channels[coded_[color]])) ++color;
     if (color < coded_.size()) {
       const std::size_t c = coded_[color];
-      MAPCODEC_ASSIGN(SurfaceColor e,
-                      encode_surface_color(schema_.channels[c], tile_.channels[c], near_,
-                                           SamePositions(tile_.xyz), encoding, effort_, color_slope_));
+      if (!content_.color) {
+        content_.color = std::make_unique<SurfaceColorEncoder>(
+            tile_.channels[c], content_.near, *content_.ties, content_.encoding, settings_.effort);
+      }
+      SurfaceColor e = content_.color->encode(schema_.channels[c].bound, settings_.color_slope);
       r.channels[color] = std::move(e.bytes);
       r.errors.color_error = e.error;
       r.least_color_error = e.least_error;
       shift = e.voxel_shift;
     }
-    const surface::VoxelOrder sorted = set_voxels(encoding, shift);
+    const surface::VoxelOrder sorted = set_voxels(content_.encoding, shift);
     for (std::size_t i = 0; i < coded_.size(); ++i) {
       if (i == color) continue;
       MAPCODEC_ASSIGN(r.channels[i], encode_other(coded_[i], sorted));
@@ -101,40 +120,77 @@ class TileChannels {
  private:
   [[nodiscard]] Result<Bytes> encode_other(std::size_t c, const surface::VoxelOrder& sorted) const {
     const ChannelSchema& schema = schema_.channels[c];
-    const Channel values = on_decoded(schema, tile_.channels[c], near_, SamePositions(tile_.xyz));
+    const Channel values = on_decoded(schema, tile_.channels[c], content_.near, *content_.ties);
     Channel ordered{values.info, Bytes(values.data.size())};
     for (std::size_t i = 0; i < sorted.order.size(); ++i) {
       std::memcpy(ordered.at(i), values.at(sorted.order[i]), values.info.stride());
     }
-    MAPCODEC_ASSIGN(ChannelEncoding e, encode_channel(schema, ordered, sorted.voxels, effort_));
+    MAPCODEC_ASSIGN(ChannelEncoding e, encode_channel(schema, ordered, sorted.voxels, settings_.effort));
     return std::move(e.bytes);
   }
 
   const PointCloud& tile_;
   const MapSchema& schema_;
-  const NearestPair& near_;
-  Effort effort_;
-  double color_slope_;
+  const TileSettings& settings_;
+  Content& content_;
   std::vector<std::size_t> coded_;
 };
 
-}  // namespace
-
-Result<SurfaceTile> encode_surface_tile(const PointCloud& tile, const MapSchema& schema, double step_m,
-                                        const TileSettings& settings) {
+Result<std::unique_ptr<Content>> code_positions(const PointCloud& tile, const MapSchema& schema,
+                                                double step_m, const TileSettings& settings) {
+  auto c = std::make_unique<Content>();
+  c->step_m = step_m;
+  c->effort = settings.effort;
   const Quantizer lattice{schema.origin, step_m, schema.coordinates.kind};
-  MAPCODEC_ASSIGN(SurfaceEncoding e, encode_surface(tile.xyz, lattice, {settings.effort}));
-  SurfaceTile r;
-  for (const Vec3& p : e.decoded) r.bounds.add(p);
+  MAPCODEC_ASSIGN(c->encoding, encode_surface(tile.xyz, lattice, {settings.effort}));
+  c->no_voxels = c->encoding.header.voxel_shift;
+  SurfaceTile& r = c->figures;
+  const std::vector<Vec3>& decoded = c->encoding.decoded;
+  for (const Vec3& p : decoded) r.bounds.add(p);
   if (settings.rough_errors && coded_channels(schema, CodecId::surface).empty()) {
-    const RoughErrors rough = estimate_errors(tile.xyz, e.decoded);
+    const RoughErrors rough = estimate_errors(tile.xyz, decoded);
     set_rms(std::sqrt(rough.forth), std::sqrt(rough.back), r);
   } else {
-    const NearestPair near = find_nearest_pair(tile.xyz, e.decoded);
-    measure(tile.xyz, e.decoded, near, r);
-    MAPCODEC_TRY(TileChannels(tile, schema, near, settings.effort, settings.color_slope).encode(e, r));
+    c->near = find_nearest_pair(tile.xyz, decoded);
+    measure(tile.xyz, decoded, c->near, r);
   }
-  r.geometry = std::move(e.bytes);
+  return c;
+}
+
+}  // namespace
+
+TileMemo::TileMemo() = default;
+TileMemo::TileMemo(TileMemo&&) noexcept = default;
+TileMemo& TileMemo::operator=(TileMemo&&) noexcept = default;
+TileMemo::~TileMemo() = default;
+
+std::uint64_t TileMemo::bytes_for(std::uint64_t points) {
+  constexpr std::uint64_t kPositions =
+      sizeof(Vec3) + sizeof(surface::SubUnits) + 2 * (4 + sizeof(double)) + 12;
+  constexpr std::uint64_t kColor = 200;  // a SurfaceColorEncoder of few voxels, about
+  return points * (kPositions + kColor);
+}
+
+std::uint64_t TileMemo::bytes() const {
+  return content == nullptr ? 0 : bytes_for(content->encoding.points.size());
+}
+
+Result<SurfaceTile> encode_surface_tile(const PointCloud& tile, const MapSchema& schema, double step_m,
+                                        const TileSettings& settings, TileMemo* memo) {
+  std::unique_ptr<Content> own;
+  Content* coded = memo == nullptr ? nullptr : memo->content.get();
+  const bool known = coded != nullptr && coded->step_m == step_m && coded->effort == settings.effort &&
+                     coded->encoding.points.size() == tile.size();
+  if (!known) {
+    MAPCODEC_ASSIGN(own, code_positions(tile, schema, step_m, settings));
+    coded = own.get();
+  }
+  SurfaceTile r = coded->figures;
+  TileChannels channels(tile, schema, settings, *coded);
+  coded->encoding.bytes.front() = coded->no_voxels;
+  MAPCODEC_TRY(channels.encode(r));
+  r.geometry = coded->encoding.bytes;
+  if (memo != nullptr && own != nullptr && !coded->near.back.index.empty()) memo->content = std::move(own);
   return r;
 }
 

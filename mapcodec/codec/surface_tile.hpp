@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "mapcodec/codec/tile_codec.hpp"
+#include "mapcodec/codec/tile_memo.hpp"
 
 namespace mapcodec {
 
@@ -20,9 +21,11 @@ struct SurfaceTile {
 };
 
 /// @param tile  at least one point; channels as in schema.channels.
-/// @param step_m  surface step. @param settings  effort, color_slope, rough_errors.
+/// @param step_m  surface step. @param settings  effort, color_slope, rough_errors. @param memo  as for
+/// encode_tile.
 /// Errors: InvalidArgument (as encode_surface and encode_channel).
 [[nodiscard]] Result<SurfaceTile> encode_surface_tile(const PointCloud& tile, const MapSchema& schema,
-                                                      double step_m, const TileSettings& settings);
+                                                      double step_m, const TileSettings& settings,
+                                                      TileMemo* memo = nullptr);
 
 }  // namespace mapcodec

@@ -52,13 +52,15 @@ struct PaperSettings {
   bool raw = false;                ///< store as the paper did (floats), to compare its own ratio
 };
 
+class TileMemo;
+
 struct TileSettings {
   CodecId codec = CodecId::points;
   Effort effort = Effort::standard;
   bool keep_counts = true;  ///< points: voxels keep how many points they stood for
   double step_m = 0;        ///< points, surface: this tile's own step (written into it); 0: schema.step_m
   /// surface: > 0: bounded colour is not coded to its bound but so that the last bit saves this much error
-  /// (see encode_surface_color). The map's bound is then the caller's to keep.
+  /// (see SurfaceColorEncoder). The map's bound is then the caller's to keep.
   double color_slope = 0;
   /// points, surface: for searches. Where no channel is coded, the RMS is measured on a part of the points
   /// (within about 1 %), and neither the largest nor the density error is.
@@ -91,10 +93,12 @@ struct EncodedTile {
 /// @param tile      points [m, map frame], channels as in schema.channels (all, dropped ones too, same
 /// order).
 /// @param schema    schema.step_m and schema.channels say what is kept.
+/// @param memo      surface: if it remembers this tile at this step, its positions are not coded again;
+///                  otherwise it remembers them from now on, unless errors are rough. Same bytes without it.
 /// Errors: InvalidArgument (non-finite points in a lossy codec, a lattice finer than 2^21 cells a side, empty
 /// tile).
 [[nodiscard]] Result<EncodedTile> encode_tile(const PointCloud& tile, const MapSchema& schema,
-                                              const TileSettings& settings);
+                                              const TileSettings& settings, TileMemo* memo = nullptr);
 
 /// Decodes one tile payload, which may be hostile.
 /// @return points laid out as schema.layout().

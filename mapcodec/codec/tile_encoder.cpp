@@ -129,9 +129,9 @@ Result<EncodedTile> encode_with_channels(const PointCloud& tile, const MapSchema
 }
 
 Result<EncodedTile> encode_by_surfaces(const PointCloud& tile, const MapSchema& schema,
-                                       const TileSettings& settings) {
+                                       const TileSettings& settings, TileMemo* memo) {
   const double step_m = step_of(schema, settings);
-  MAPCODEC_ASSIGN(const SurfaceTile t, encode_surface_tile(tile, schema, step_m, settings));
+  MAPCODEC_ASSIGN(const SurfaceTile t, encode_surface_tile(tile, schema, step_m, settings, memo));
   ByteWriter out;
   EncodedTile r = begin_tile(tile, schema, CodecId::surface, tile.size(), step_m, out);
   append_section(out, t.geometry, t.channels.empty());
@@ -187,8 +187,8 @@ Status check_input(const PointCloud& tile, const MapSchema& schema, const TileSe
 
 }  // namespace
 
-Result<EncodedTile> encode_tile(const PointCloud& tile, const MapSchema& schema,
-                                const TileSettings& settings) {
+Result<EncodedTile> encode_tile(const PointCloud& tile, const MapSchema& schema, const TileSettings& settings,
+                                TileMemo* memo) {
   MAPCODEC_TRY(check_input(tile, schema, settings));
   switch (settings.codec) {
     case CodecId::lossless:
@@ -197,7 +197,7 @@ Result<EncodedTile> encode_tile(const PointCloud& tile, const MapSchema& schema,
     case CodecId::paper:
       return encode_paper_tile(tile, schema, settings);
     case CodecId::surface:
-      return encode_by_surfaces(tile, schema, settings);
+      return encode_by_surfaces(tile, schema, settings, memo);
     default:
       return make_error(ErrorCode::kUnknownCodec,
                         std::string("no encoder for codec ") + codec_name(settings.codec));

@@ -8,6 +8,8 @@ namespace {
 
 constexpr std::uint64_t kLeastDeadBytes = std::uint64_t{1} << 20;
 constexpr double kSegmentsPerTile = 1.5;
+// Before calls have to wait for a compaction again the file is so much longer than after the last one.
+constexpr double kGrowth = 2;
 
 std::uint64_t segments_of(const MapArchive& archive) {
   std::uint64_t segments = 0;
@@ -46,29 +48,38 @@ void Compactor::watch() {
     lock.unlock();
     for (const HostedMapPtr& map : registry_.all()) {
       map->reader.forget_old_files();
-      if (!ending_ && is_due(*map)) compact_quietly(*map);
+      if (ending_) break;
+      const Due when = due(*map);
+      if (when != Due::no) compact_quietly(*map, when == Due::at_rest);
     }
     lock.lock();
   }
 }
 
-bool Compactor::is_due(HostedMap& map) const {
-  if (context_.settings.compact_idle_s <= 0 || map.worker.has_work() || map.last_use_ns == 0) return false;
+Compactor::Due Compactor::due(HostedMap& map) const {
+  const ServiceSettings& s = context_.settings;
+  if (s.compact_idle_s <= 0 || map.last_use_ns == 0) return Due::no;
   const auto idle = std::chrono::steady_clock::now().time_since_epoch().count() - map.last_use_ns;
-  if (double(idle) * 1e-9 < context_.settings.compact_idle_s) return false;
+  const bool rests = !map.worker.has_work() && double(idle) * 1e-9 >= s.compact_idle_s;
   const auto view = map.view();
-  if (!view.ok()) return false;
+  if (!view.ok()) return Due::no;
   const MapArchive& archive = *(*view)->archive;
-  if (archive.revision() == map.compacted_revision) return false;
-  const std::uint64_t file = archive.file_bytes(), live = std::min(file, live_bytes(archive));
-  const bool dead = file - live > kLeastDeadBytes &&
-                    double(file - live) > context_.settings.compact_dead_share * double(file);
-  return dead || double(segments_of(archive)) > kSegmentsPerTile * double(archive.tiles().size());
+  if (archive.revision() == map.compacted_revision) return Due::no;
+  const std::uint64_t file = archive.file_bytes(), dead = file - std::min(file, live_bytes(archive));
+  const double share = file > 0 ? double(dead) / double(file) : 0;
+  if (!rests) {
+    // Once is enough where kept revisions are what makes the file long.
+    const bool grown = double(file) > kGrowth * double(map.compacted_bytes);
+    return share > s.compact_must_share && dead > s.compact_must_bytes && grown ? Due::now : Due::no;
+  }
+  const bool is_dead = dead > kLeastDeadBytes && share > s.compact_dead_share;
+  const bool many = double(segments_of(archive)) > kSegmentsPerTile * double(archive.tiles().size());
+  return is_dead || many ? Due::at_rest : Due::no;
 }
 
-void Compactor::compact_quietly(HostedMap& map) {
+void Compactor::compact_quietly(HostedMap& map, bool gives_way) {
   (void)context_.catalogue.job(map.name, "compact", "begun").ok();
-  const auto report = compact(map, {}, true);
+  const auto report = compact(map, {}, gives_way);
   (void)context_.catalogue.job(map.name, "compact", report.ok() ? "done" : report.error().to_string()).ok();
 }
 
@@ -114,7 +125,10 @@ Result<CompactReport> Compactor::compact(HostedMap& map, const CompactJob& job, 
     return s.error();
   }
   context_.metrics.add(Counter::compactions);
-  if (const auto view = map.view(); view.ok()) map.compacted_revision = (*view)->archive->revision();
+  if (const auto view = map.view(); view.ok()) {
+    map.compacted_revision = (*view)->archive->revision();
+    map.compacted_bytes = (*view)->archive->file_bytes();
+  }
   return report;
 }
 

@@ -11,7 +11,8 @@ namespace mapcodec {
 
 /// Looks at the maps once a second. A map that nobody used for a while, and of whose file a large share is
 /// dead or whose tiles have segments to be folded, is compacted; a call to the map stops that, and it is
-/// tried again later.
+/// tried again later. Where traffic never rests and nearly all of the file is dead, calls have to wait for
+/// it.
 class Compactor {
  public:
   Compactor(MapRegistry& registry, ServiceContext& context);
@@ -25,9 +26,10 @@ class Compactor {
 
  private:
   void watch();
-  [[nodiscard]] bool is_due(HostedMap& map) const;
+  enum class Due { no, at_rest, now };
+  [[nodiscard]] Due due(HostedMap& map) const;
   [[nodiscard]] Status fold(const std::string& path, const std::atomic<bool>& stop) const;
-  void compact_quietly(HostedMap& map);
+  void compact_quietly(HostedMap& map, bool gives_way);
 
   MapRegistry& registry_;
   ServiceContext& context_;

@@ -22,8 +22,8 @@ struct HostedMap {
   MapReader reader;
   WatchList watchers;
   MapWorker worker;
-  std::atomic<std::int64_t> last_use_ns{0};  ///< steady clock
-  std::atomic<std::uint64_t> compacted_revision{0};
+  std::atomic<std::int64_t> last_use_ns{0};                              ///< steady clock
+  std::atomic<std::uint64_t> compacted_revision{0}, compacted_bytes{0};  ///< after the last compaction
   std::atomic<bool> compacting{false};
   std::atomic<bool> wanted{false};  ///< since compaction in the background began: it gives way
 

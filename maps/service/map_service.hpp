@@ -29,7 +29,9 @@ struct ServiceSettings {
   double editor_idle_s = 60;        ///< then its memory and its lock are given back
   double compact_idle_s = 30;       ///< no traffic for so long before a map is compacted; 0: never
   double compact_dead_share = 0.5;  ///< of the file that no kept revision needs
-  std::uint64_t max_scan_points = std::uint64_t{1} << 22;  ///< in one scan
+  double compact_must_share = 0.8;  ///< then it is compacted though there is traffic, which waits; 1: never
+  std::uint64_t compact_must_bytes = std::uint64_t{64} << 20;  ///< nor before so many dead bytes
+  std::uint64_t max_scan_points = std::uint64_t{1} << 22;      ///< in one scan
 };
 
 /// A map at one revision, for as long as somebody holds it.

@@ -37,10 +37,13 @@ class Interruption(ProgramTest):
         self.source.write_bytes(self.data)
 
     def interrupt(self, number, delay, *arguments):
-        """Sends the signal after `delay`; the exit code, stderr and whether the signal was to be handled; or None when
-        the program was done before."""
+        """Sends the signal after `delay` (None: as soon as it will be handled); the exit code, stderr and whether the
+        signal was to be handled; or None when the program was done before."""
         process = start(*arguments)
-        time.sleep(delay)
+        if delay is not None:
+            time.sleep(delay)
+        while delay is None and process.poll() is None and not listens(process, number):
+            time.sleep(0.002)
         done = process.poll() is not None
         heard = not done and listens(process, number)
         if not done:
@@ -53,7 +56,7 @@ class Interruption(ProgramTest):
         before = self.listing()
         met = 0
         for number in (signal.SIGINT, signal.SIGTERM):
-            for delay in DELAYS:
+            for delay in (*DELAYS, None):
                 outcome = self.interrupt(number, delay, *arguments)
                 if outcome is None or outcome[0] == 0:  # it was done, or past the point where it could stop
                     if old is None:

@@ -190,6 +190,24 @@ TEST_F(ServiceClient, ScansArriveOnceThoughTheServerGoesAway) {
   EXPECT_EQ(client_->stats()->points, 20000u);
 }
 
+TEST_F(ServiceClient, ARobotThatRestsSendsOn) {
+  stop();
+  grpc_.idle_stream_s = 0.2;
+  start();
+  SenderSettings settings;
+  settings.writer = "robot";
+  auto sender = ScanSender::open(*client_, settings);
+  ASSERT_TRUE(sender.ok()) << sender.error().to_string();
+  for (unsigned i = 1; i <= 2; ++i) {
+    ASSERT_TRUE((*sender)->send(scan_of(i, 1000)).ok());
+    const auto revision = (*sender)->finish();
+    ASSERT_TRUE(revision.ok()) << revision.error().to_string();
+    std::this_thread::sleep_for(std::chrono::milliseconds(2500));
+  }
+  EXPECT_GE((*sender)->reconnects(), 1u);
+  EXPECT_EQ(client_->stats()->points, 2000u);
+}
+
 TEST_F(ServiceClient, ALocalMapWorksOnWithoutTheServer) {
   send(1, 20000);
   send(2, 20000, 200);

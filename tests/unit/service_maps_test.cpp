@@ -241,6 +241,25 @@ TEST_F(ServiceMaps, IdleMapsAreCompacted) {
   EXPECT_EQ(points("m"), 6000u);
 }
 
+TEST_F(ServiceMaps, MapsThatNeverRestAreCompactedBeforeTheyDrown) {
+  create("m");
+  settings_.compact_idle_s = 1000;
+  settings_.compact_must_share = 0.2;
+  settings_.compact_must_bytes = 1000;
+  service_ = nullptr;
+  open();
+  const std::uint64_t file = service_->view("m").value()->file;
+  bool compacted = false;
+  std::size_t scans = 0;
+  const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(60);
+  while (!compacted && std::chrono::steady_clock::now() < end) {
+    ASSERT_TRUE(put("m", scan_of(unsigned(scans++))).ok());
+    compacted = service_->view("m").value()->file != file;
+  }
+  EXPECT_TRUE(compacted);
+  EXPECT_EQ(points("m"), 1000u * scans);
+}
+
 TEST_F(ServiceMaps, OthersMayWriteWhileWeDoNot) {
   create("m");
   EXPECT_EQ(service_->view("m").value()->archive->revision(), 1u);

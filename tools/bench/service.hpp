@@ -33,8 +33,9 @@ class ChildDaemon {
 struct LoadSettings {
   int writers = 4, readers = 8;
   double seconds = 30;
-  double scans_per_second = 0;  ///< of each writer; 0: as fast as it goes
-  bool same_places = false;     ///< the writers come to the same places again and again
+  double scans_per_second = 0;    ///< of each writer; 0: as fast as it goes
+  double fetches_per_second = 0;  ///< of each reader; 0: as fast as it goes
+  bool same_places = false;       ///< the writers come to the same places again and again
 };
 struct LoadResult {
   double seconds = 0, points_per_second = 0;

@@ -36,6 +36,11 @@ struct Shared {
   }
 };
 
+void wait_until(double seconds, const Watch& watch) {
+  const double early = seconds - watch.seconds();
+  if (early > 0) std::this_thread::sleep_for(std::chrono::duration<double>(early));
+}
+
 /// Sends until told to stop. Durable within a window: what is counted was acknowledged.
 Status write(Shared& shared, const std::string& url, const PointCloud& scan, int number,
              const LoadSettings& s) {
@@ -47,8 +52,7 @@ Status write(Shared& shared, const std::string& url, const PointCloud& scan, int
   const Watch watch(Watch::Kind::wall);
   std::uint64_t scans = 0;
   while (!shared.stop) {
-    const double early = s.scans_per_second > 0 ? double(scans) / s.scans_per_second - watch.seconds() : 0;
-    if (early > 0) std::this_thread::sleep_for(std::chrono::duration<double>(early));
+    wait_until(s.scans_per_second > 0 ? double(scans) / s.scans_per_second : 0, watch);
     Scan message;
     message.points = scan;
     const double along = s.same_places ? double(scans % 40) : double(scans);
@@ -68,10 +72,12 @@ Status write(Shared& shared, const std::string& url, const PointCloud& scan, int
 }
 
 /// Pulls the tiles around random places, again and again.
-Status read(Shared& shared, const std::string& url, int number) {
+Status read(Shared& shared, const std::string& url, int number, double per_second) {
   MAPCODEC_ASSIGN(const MapClient client, MapClient::connect(url));
   std::mt19937 random(static_cast<unsigned>(100 + number));
-  while (!shared.stop) {
+  const Watch watch(Watch::Kind::wall);
+  for (std::uint64_t fetches = 0; !shared.stop; ++fetches) {
+    wait_until(per_second > 0 ? double(fetches) / per_second : 0, watch);
     TileRequest request;
     request.selection.sphere = {{double(random() % 100), 200.0 * double(random() % 4), 0}, 15};
     const auto take = [&](RemoteTile&& tile) -> Status {
@@ -99,7 +105,8 @@ Result<LoadResult> run_load(ChildDaemon& daemon, const std::string& map, const P
     });
   for (int i = 0; i < settings.readers; ++i)
     threads.emplace_back([&, i] {
-      if (const Status s = read(shared, url, i); !s.ok()) shared.fault(s.error());
+      if (const Status s = read(shared, url, i, settings.fetches_per_second); !s.ok())
+        shared.fault(s.error());
     });
   while (!shared.stop && watch.seconds() < settings.seconds) {
     std::this_thread::sleep_for(std::chrono::seconds(1));

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <spdlog/fmt/fmt.h>
 
+#include <algorithm>
 #include <filesystem>
 
 #include "slam_adapter/client/map_replica.hpp"
@@ -90,11 +91,27 @@ Status measure_soak(const BenchSettings& settings, const PointCloud& scan, Repor
   LoadSettings load;
   load.seconds = settings.quick ? 20 : settings.minutes * 60;
   load.scans_per_second = 1;
+  load.fetches_per_second = 2;
   load.same_places = true;
   settings.say(fmt::format("mixed load for {:.0f} s", load.seconds));
   MAPCODEC_ASSIGN(const LoadResult r, run_load(daemon, "m", scan, load));
-  row_of(report, "soak: 4 x 1 Hz, 8 readers", r);
+  report.line("\n## Mixed load over minutes\n");
+  report.table(kHead);
+  row_of(report, "4 writers at 1 Hz, 8 readers at 2 Hz", r);
   report.json()["soak"] = json_of(r);
+  report.line("\n| part of the soak | MB, median | MB, most |\n|---|---|---|");
+  constexpr std::size_t kParts = 6;
+  for (std::size_t part = 0; part < kParts; ++part) {
+    const auto at = [&](std::size_t k) {
+      return r.resident_mb.begin() + std::ptrdiff_t(r.resident_mb.size() * k / kParts);
+    };
+    const std::vector<double> some(at(part), at(part + 1));
+    if (some.empty()) continue;
+    report.row(
+        {fmt::format("{} of {}", part + 1, kParts), digits(quantile(some, 0.5)), digits(quantile(some, 1))});
+    report.json()["soak"]["parts"].push_back(
+        {{"median_mb", quantile(some, 0.5)}, {"most_mb", quantile(some, 1)}});
+  }
   Plot plot;
   plot.title = "resident memory of mapcodecd";
   plot.x_label = "s";
@@ -162,10 +179,14 @@ Status bench_service(const BenchSettings& settings) {
   bench::Report report(settings, "service", settings.threads);
   MAPCODEC_TRY(report.begin());
   MAPCODEC_ASSIGN(const PointCloud scan, bench::real_scan(settings));
-  MAPCODEC_TRY(bench::measure_fetch(settings, report));
-  MAPCODEC_TRY(bench::measure_sync(settings, scan, report));
-  MAPCODEC_TRY(bench::measure_load(settings, scan, report));
-  MAPCODEC_TRY(bench::measure_soak(settings, scan, report));
+  const auto wanted = [&](const char* part) {
+    const auto& only = settings.files;
+    return only.empty() || std::find(only.begin(), only.end(), part) != only.end();
+  };
+  if (wanted("fetch")) MAPCODEC_TRY(bench::measure_fetch(settings, report));
+  if (wanted("sync")) MAPCODEC_TRY(bench::measure_sync(settings, scan, report));
+  if (wanted("load")) MAPCODEC_TRY(bench::measure_load(settings, scan, report));
+  if (wanted("soak")) MAPCODEC_TRY(bench::measure_soak(settings, scan, report));
   return report.finish();
 }
 

@@ -75,7 +75,9 @@ void add_bench(CLI::App& app, Action& action) {
   verb->add_option("--data", a->settings.data, "Folder that is searched for clouds")->required();
   verb->add_option("-o,--output", a->settings.report, "Folder for the report")->required();
   verb->add_option("--threads", a->settings.threads, "0: all cores")->check(CLI::Range(0, 1024));
-  verb->add_option("--only", a->settings.files, "Only clouds whose path contains one of these");
+  verb->add_option(
+      "--only", a->settings.files,
+      "Only clouds whose path contains one of these, or parts of a bench (service: fetch, sync, load, soak)");
   verb->add_option("--minutes", a->settings.minutes, "service: of the mixed load")
       ->check(CLI::PositiveNumber);
   verb->add_flag("--quick", a->settings.quick, "Few clouds and bounds");

@@ -41,6 +41,9 @@ void visit_storage(Settings& s, Visitor& v) {
   v.value("idle_s", s.service.compact_idle_s, "Only after so long without traffic; 0: never.", kTime);
   v.value("dead_share", s.service.compact_dead_share, "Share of a file that no kept revision needs.",
           Range{0.01, 1});
+  v.value("must_share", s.service.compact_must_share,
+          "Share from which calls wait for it, if traffic never rests; 1: never.", Range{0.01, 1});
+  v.value("must_bytes", s.service.compact_must_bytes, "Not before so many bytes are dead.", Range{0, 1e15});
   v.value("keep_last", s.retention.keep_last,
           "Newest revisions kept beside snapshots, where a map has no own rule.", Range{1, 1e12});
 }

@@ -61,7 +61,8 @@ class InsertStream final : public grpc::ServerBidiReactor<v1::InsertRequest, v1:
     const std::lock_guard lock(mutex_);
     const auto idle = std::chrono::duration<double>(call_.context.settings.idle_stream_s);
     if (under_way_ > 0 || finished_ || now - last_message_ < idle) return;
-    fail(make_error(ErrorCode::kCancelled, "the stream sent nothing for too long"));
+    // Nothing is lost, and a client that has something again opens another one.
+    fail(make_error(ErrorCode::kUnreachable, "the stream sent nothing for too long"));
     go_on();
   }
 
@@ -124,6 +125,7 @@ class InsertStream final : public grpc::ServerBidiReactor<v1::InsertRequest, v1:
     const std::lock_guard lock(mutex_);
     --under_way_;
     points_under_way_ -= points;
+    last_message_ = Clock::now();  // until now the client may have waited for this
     if (!receipt.ok()) {
       fail(receipt.error());
     } else if (!durable_broken_) {
