@@ -10,6 +10,8 @@ target_compile_options(mapcodec_flags INTERFACE -ffp-contract=off -fno-tree-slp-
 if(MAPCODEC_SANITIZE)
   add_compile_options(-fsanitize=${MAPCODEC_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all)
   add_link_options(-fsanitize=${MAPCODEC_SANITIZE})
+  # As in Debian's PCL: with AddressSanitizer alone Eigen would align by hand, and free what PCL allocated otherwise.
+  add_compile_definitions(EIGEN_MALLOC_ALREADY_ALIGNED=1)
 endif()
 
 # mapcodec_library(codec SOURCES ...) makes mapcodec_codec, exported as mapcodec::codec.
