@@ -23,7 +23,7 @@ from pathlib import Path
 import grpc
 
 from certificates import Authority
-from daemon import DAEMON, Daemon, DaemonTest, fetch, insert, opening, pb, rpc, scan, scan_of
+from daemon import DAEMON, Daemon, DaemonTest, fetch, insert, memory_factor, opening, pb, rpc, scan, scan_of
 
 CONNECTIONS = int(os.environ.get("MAPCODEC_CONNECTIONS", "1500"))
 FUZZ_SECONDS = float(os.environ.get("MAPCODEC_FUZZ_SECONDS", "0"))
@@ -380,7 +380,7 @@ class TooMuch(SecureTest):
         with socket.create_connection((host, int(port)), timeout=20) as s:
             s.sendall(b"POST /maps/m/index HTTP/1.1\r\nContent-Length: 1073741824\r\n\r\n")
             self.assertIn(b" 405 ", s.recv(4096))
-        self.assertLess(self.rss() - before, 200 << 20)
+        self.assertLess(self.rss() - before, memory_factor() * (200 << 20))
         self.stub.Stats(pb.StatsRequest(map="m"), timeout=20)
 
     def test_slow_loris(self):
