@@ -66,10 +66,13 @@ Status insert_source(MapUpdater& map, PointSource& source, const RigidMotion& po
   PointCloud block;
   for (;;) {
     MAPCODEC_ASSIGN(const bool more, source.next(block));
-    if (!more) return {};
+    if (!more) {
+      map.end_scan();
+      return {};
+    }
     PointCloud points = std::exchange(block, {});
     move_points(points, pose);
-    MAPCODEC_TRY(map.insert(std::move(points), submap));
+    MAPCODEC_TRY(map.insert(std::move(points), submap, MapUpdater::ScanEnd::later));
   }
 }
 
