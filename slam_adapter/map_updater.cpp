@@ -190,22 +190,27 @@ Result<TileWork> MapUpdater::State::prepare(const TilePlace& place) {
 }
 
 /// @param generous  scans of tiles that may have more than the promise: where the map on the whole would not
-/// keep it, they are looked at again.
+/// keep it, they are looked at again, with so much less.
 Status MapUpdater::State::look_up_all(std::vector<TileWork>& work, const Batch& generous) {
   const auto look = [&](std::size_t i) { return look_up(work[i], schema, coding); };
   MAPCODEC_TRY(run_all(work.size(), look));
-  double known = 0, known_m2 = 0;
+  const double limit = schema.promise_value * schema.promise_value;
+  double known = 0, known_m2 = 0, beyond_m2 = 0;
   for (const TileWork& w : work) {
     known += w.known;
     known_m2 += w.known_m2;
+    beyond_m2 += std::max(0.0, w.known_m2 - limit * w.known);
   }
-  if (generous.empty() || rms.holds(known, known_m2)) return {};
+  const double excess_m2 = generous.empty() ? 0 : rms.excess_m2(known, known_m2);
+  if (!(excess_m2 > 0)) return {};
+  const double left = std::max(0.0, 1 - excess_m2 / std::max(beyond_m2, excess_m2));
   for (TileWork& w : work) {
     const auto scans = generous.find(w.place);
-    if (scans == generous.end()) continue;
+    if (scans == generous.end() || w.known_m2 <= limit * w.known) continue;
+    const double mean_m2 = w.known_m2 / w.known;
     cache.erase(w.place);
     MAPCODEC_ASSIGN(w, prepare(w.place));
-    w.allowed_rms_m = schema.promise_value;
+    w.allowed_rms_m = std::sqrt(limit + left * (mean_m2 - limit));
     w.scans = scans->second;
   }
   return run_all(work.size(), look);

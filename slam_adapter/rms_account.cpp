@@ -17,8 +17,8 @@ double root_mean(double sum, double count) {
 
 // Of the promise, squared: what novelty reckons that folding adds where pending points stand for others.
 constexpr double kReckoned = kFoldedShare * kFoldedShare;
-// What rounding of recorded figures may not cross.
-constexpr double kRounding = 1 - 1e-6;
+// So much of it folding may spend: the rest is for scans that come again and are worse than the average.
+constexpr double kSpent = 0.99;
 
 }  // namespace
 
@@ -53,15 +53,15 @@ void RmsAccount::add(const Entry& e) {
   if (e.pending) pending_ += e.added;
 }
 
-bool RmsAccount::holds(double known, double known_m2) const {
+double RmsAccount::excess_m2(double known, double known_m2) const {
   const double limit = promise_m_ * promise_m_;
-  return forward_m2_ + known_m2 + pending_ * kReckoned * limit <= limit * (came_ + known);
+  return forward_m2_ + known_m2 + pending_ * kReckoned * limit - limit * (came_ + known);
 }
 
 double RmsAccount::folding_rms_m() const {
   const double usual = kFoldedShare * promise_m_;
   if (!(pending_ > 0)) return usual;
-  const double limit = promise_m_ * promise_m_ * kRounding;
+  const double limit = promise_m_ * promise_m_ * kSpent;
   const double backward = (limit * stored_ - backward_m2_) / pending_;
   const double left = limit * came_ - forward_m2_;
   double forward = left / pending_;

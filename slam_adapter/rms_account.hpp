@@ -31,9 +31,9 @@ class RmsAccount {
   RmsAccount(const MapInfo& info, double promise_m, double stored);
 
   void add(const Entry& e);
-  /// Whether all that came in would still be within the promise, pending points folded.
+  /// What goes beyond the promise for all that came in, pending points folded; not above 0: nothing [m^2].
   /// @param known, known_m2  of points yet to be added.
-  [[nodiscard]] bool holds(double known, double known_m2) const;
+  [[nodiscard]] double excess_m2(double known, double known_m2) const;
   /// Root mean square error that folding may add to pending points, so that the map's promise holds [m].
   [[nodiscard]] double folding_rms_m() const;
   /// Pending points that were coded for good.

@@ -155,7 +155,8 @@ class TilesForRms {
     s.codec = CodecId::surface;
     s.step_m = step;
     MAPCODEC_ASSIGN(const EncodedTile t, encode_tile(tile, bare_, s));
-    return encode_for_rms(tile, schema_, std::max(larger_rms(t), 1e-3 * rms_m_) * (1 + 1e-9), step);
+    return encode_for_rms(tile, schema_, std::clamp(larger_rms(t), 1e-3 * rms_m_, 1.5 * rms_m_) * (1 + 1e-9),
+                          step);
   }
 
   std::span<const PointCloud> tiles_;
