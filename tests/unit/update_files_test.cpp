@@ -12,16 +12,16 @@
 namespace mapcodec {
 namespace {
 
-/// A wall before the sensor, with normals that face it.
+/// A wall before the sensor, with normals that face it or lean upwards.
 PointCloud wall() {
   PointCloud c;
   c.channels.push_back({{"normal", ScalarType::f32, 3}, {}});
   c.resize(400);
   for (std::size_t i = 0; i < c.size(); ++i) {
     c.xyz[i] = {5, 0.25 * double(i % 20), 0.25 * double(i / 20)};
-    c.channels[0].set(i, -1.0F, 0);
+    c.channels[0].set(i, i % 2 == 0 ? -1.0F : -0.6F, 0);
     c.channels[0].set(i, 0.0F, 1);
-    c.channels[0].set(i, 0.0F, 2);
+    c.channels[0].set(i, i % 2 == 0 ? 0.0F : 0.8F, 2);
   }
   return c;
 }
@@ -62,7 +62,9 @@ TEST(UpdateFiles, NormalsTurnWithThePose) {
     for (std::size_t i = 0; i < cloud->size(); ++i) {
       EXPECT_NEAR(cloud->xyz[i][1], 2 + 5, 0.001);
       EXPECT_NEAR(normal->get<float>(i, 0), 0, 0.02);
-      EXPECT_NEAR(normal->get<float>(i, 1), -1, 0.02);
+      const float y = normal->get<float>(i, 1), z = normal->get<float>(i, 2);
+      EXPECT_NEAR(y, z > 0.4F ? -0.6 : -1, 0.02);
+      EXPECT_NEAR(z, z > 0.4F ? 0.8 : 0, 0.02);
     }
   }
   std::filesystem::remove_all(folder);
