@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What updates left pending in a tile becomes part of it for good.
+// Points that are coded twice: pending, then for good.
 #pragma once
 
 #include <optional>
@@ -32,18 +32,10 @@ struct Fold {
   std::uint64_t points = 0;
   Box bounds;  ///< [m, submap frame]
   TileErrors errors;
-  Bytes bytes;  ///< one payload, joined where the tile had a base that stays as it is
+  Bytes bytes;                     ///< one payload, joined where the tile had a base that stays as it is
+  std::uint64_t coded_points = 0;  ///< that were pending and were coded again, with loss or without
+  double forward_m = 0, backward_m = 0;  ///< root mean square error of that coding, both directions
 };
-
-/// Folds the pending segments of a tile, and erasures where that loses nothing. Where positions lie on the
-/// map's lattice (max_error) or are exact (lossless), all becomes one base; else (rms, or colours within a
-/// bound) segments that were folded before stay bit for bit, and all pending ones together become one more.
-/// @param segments  base, then deltas. @param errors, bounds  of the tile.
-/// @return nothing if there is nothing to fold; `points` 0 if nothing is left of the tile.
-/// Pure: same input, same bytes. Errors: those of decoding and encoding; PromiseBroken if no coding keeps it.
-[[nodiscard]] Result<std::optional<Fold>> fold_tile(const std::vector<Bytes>& segments,
-                                                    const MapSchema& schema, const TileErrors& errors,
-                                                    const Box& bounds);
 
 /// Codes points of one tile for good: the cheapest coding within the promise, or what of it pending ones
 /// leave.
@@ -51,6 +43,10 @@ struct Fold {
 /// before. Errors: those of encoding; PromiseBroken.
 [[nodiscard]] Result<EncodedTile> encode_for_good(PointCloud points, const MapSchema& schema,
                                                   bool from_pending);
+/// What it codes by: the map's schema with the colour bound that pending points leave.
+[[nodiscard]] MapSchema schema_for_good(const MapSchema& schema, bool from_pending);
+/// Decoded points have no dropped channels; encoders want them in their places all the same.
+[[nodiscard]] PointCloud with_all_channels(PointCloud cloud, const MapSchema& schema);
 /// The same as one more pending segment: nothing is lost that was not lost before, where colours are exact.
 [[nodiscard]] Result<EncodedTile> encode_pending(PointCloud points, const MapSchema& schema,
                                                  const PendingCoding& coding);

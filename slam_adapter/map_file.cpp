@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "mapcodec/codec/tile_segments.hpp"
+#include "maps/moved_points.hpp"
 #include "maps/store_schemes.hpp"
 #include "maps/submap_pose.hpp"
 #include "parallel/encode_pipeline.hpp"
@@ -24,18 +25,9 @@ PointCloud inside(PointCloud cloud, const Region& region) {
   return keep.size() == cloud.size() ? std::move(cloud) : cloud.gather(keep);
 }
 
-/// From the frame of a submap to the map's, normals too.
+/// From the frame of a submap to the map's.
 void move_to_map(PointCloud& cloud, const MapInfo& info, std::uint32_t submap) {
-  const RigidMotion pose = pose_of(info, submap);
-  if (pose.is_identity()) return;
-  for (Vec3& p : cloud.xyz) p = pose.apply(p);
-  Channel* normals = cloud.find("normal");
-  if (normals == nullptr || normals->info.components != 3 || normals->info.scalar != ScalarType::f32) return;
-  for (std::size_t i = 0; i < normals->size(); ++i) {
-    const Vec3 n =
-        pose.rotate({normals->get<float>(i, 0), normals->get<float>(i, 1), normals->get<float>(i, 2)});
-    for (std::size_t d = 0; d < 3; ++d) normals->set(i, static_cast<float>(n[d]), d);
-  }
+  move_points(cloud, pose_of(info, submap));
 }
 
 /// Of a tile, in the map's frame.

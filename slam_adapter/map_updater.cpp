@@ -5,69 +5,19 @@
 #include <cmath>
 #include <map>
 
-#include "mapcodec/quality/novelty.hpp"
 #include "parallel/guard.hpp"
 #include "parallel/runner.hpp"
-#include "slam_adapter/fold_tile.hpp"
+#include "slam_adapter/fold_tiles.hpp"
 #include "slam_adapter/level_errors.hpp"
 #include "slam_adapter/octomap/octree_layer.hpp"
 #include "slam_adapter/point_batch.hpp"
+#include "slam_adapter/rms_account.hpp"
 #include "slam_adapter/split_tile.hpp"
 #include "slam_adapter/tile_directory.hpp"
+#include "slam_adapter/tile_work.hpp"
 
 namespace mapcodec {
 namespace {
-
-/// A tile of a submap.
-struct Place {
-  std::uint32_t submap = 0;
-  TileKey key;
-};
-struct PlaceLess {
-  bool operator()(const Place& a, const Place& b) const {
-    return compare_tiles(a.submap, a.key, b.submap, b.key) < 0;
-  }
-};
-
-/// One tile while a batch is coded.
-struct TileWork {
-  Place place;
-  PointCloud points;                     ///< that came in
-  std::shared_ptr<StoredPoints> stored;  ///< known already, or made here
-  std::vector<Bytes> segments;           ///< where it is not known
-  bool begins = false;                   ///< the tile had nothing before
-  double allowed_rms_m = 0;              ///< that points may have to what stands for them
-  Novelty novelty;
-  std::optional<EncodedTile> coded;  ///< of what is new
-  Status status;
-};
-
-/// Weighted mean of two figures.
-double mean_of(double a, double weight_a, double b, double weight_b) {
-  return weight_a + weight_b > 0 ? (a * weight_a + b * weight_b) / (weight_a + weight_b) : 0;
-}
-
-double root_mean(double a, double weight_a, double sum_b, double weight_b) {
-  return weight_a + weight_b > 0 ? std::sqrt((a * a * weight_a + sum_b) / (weight_a + weight_b)) : 0;
-}
-
-/// What joins old points and new ones, those that only stand for others included.
-/// @param old_points  that came in. @param old_stored  that are stored: the other direction of the RMS is
-/// theirs.
-TileErrors joint(const TileErrors& old, double old_points, double old_stored, const TileWork& w,
-                 double farthest_m) {
-  const double known = double(w.points.size() - w.novelty.added.size());
-  const TileErrors add = w.coded ? w.coded->errors : TileErrors{};
-  const double added = double(w.novelty.added.size());
-  TileErrors e;
-  const double squares = added * add.rms_m * add.rms_m;
-  const double forward = root_mean(old.rms_m, old_points, w.novelty.squared_m2 + squares, known + added);
-  e.rms_m = std::max(forward, root_mean(old.rms_m, old_stored, squares, added));
-  e.max_axis_error_m = std::max({old.max_axis_error_m, add.max_axis_error_m, known > 0 ? farthest_m : 0});
-  e.color_error = mean_of(old.color_error, old_points, add.color_error, added);
-  e.density_error = mean_of(old.density_error, old_points, add.density_error, added);
-  return e;
-}
 
 /// The level that most points have.
 std::uint8_t usual_level(const std::vector<const TileRecord*>& tiles) {
@@ -78,25 +28,6 @@ std::uint8_t usual_level(const std::vector<const TileRecord*>& tiles) {
   const auto most = std::max_element(points.begin(), points.end(),
                                      [](const auto& a, const auto& b) { return a.second < b.second; });
   return most == points.end() ? 0 : most->first;
-}
-
-/// All points of a tile, those first that no folding will move.
-Status add_segments(StoredPoints& stored, const std::vector<Bytes>& segments, const MapSchema& schema) {
-  const Bytes joined = join_segments(segments);
-  MAPCODEC_ASSIGN(const std::vector<ByteSpan> all, split_segments(joined));
-  PointCloud parts[2] = {schema.layout(), schema.layout()};
-  for (const ByteSpan s : all) {
-    if (is_erasure(s)) {
-      MAPCODEC_ASSIGN(const Erasure e, read_erasure(s));
-      for (PointCloud& part : parts) MAPCODEC_TRY(erase_points(part, e));
-      continue;
-    }
-    MAPCODEC_ASSIGN(const PointCloud cloud, decode_tile(s, schema));
-    parts[is_pending(s)].append(cloud);
-  }
-  stored.add(parts[0], false);
-  stored.add(parts[1], true);
-  return {};
 }
 
 }  // namespace
@@ -112,16 +43,22 @@ struct MapUpdater::State {
   std::uint8_t new_level = 0;
   std::optional<std::uint32_t> octree;  ///< submap whose tiles are no points
   std::map<std::uint32_t, TileDirectory> directories;
-  std::vector<std::pair<std::uint32_t, PointCloud>> held;
+  struct Held {
+    std::uint32_t submap = 0;
+    ScanPart part;
+  };
+  std::vector<Held> held;
+  std::uint64_t scan = 0;  // number of the one that comes
   std::uint64_t held_points = 0;
   struct Known {
     std::shared_ptr<StoredPoints> points;
     std::uint64_t used = 0;
   };
-  std::map<Place, Known, PlaceLess> cache;
+  std::map<TilePlace, Known, TilePlaceLess> cache;
   std::uint64_t clock = 0;
   UpdateReport report;
   TileErrors achieved;  // of the map, what came in since the last commit included
+  RmsAccount rms;
   std::uint64_t input_points = 0, stored_points = 0, input_bytes = 0;
   bool changed = false;
   std::map<std::string, Bytes> extras;  // of the next revision
@@ -133,13 +70,12 @@ struct MapUpdater::State {
     return s;
   }
   Status flush();
-  void sort_into_tiles(std::map<Place, PointCloud, PlaceLess>& tiles, std::uint32_t submap,
-                       const PointCloud&);
+  using Batch = std::map<TilePlace, std::vector<ScanPart>, TilePlaceLess>;
+  void sort_into_tiles(Batch& tiles, const Held& held);
   TileDirectory& directory(std::uint32_t submap);
   Result<std::vector<Bytes>> read_all(const TileRecord& record) const;
-  Result<TileWork> prepare(const Place& place, PointCloud points);
-  Status work_on(TileWork& w) const;
-  Status look_up(TileWork& w) const;
+  Result<TileWork> prepare(const TilePlace& place);
+  Status look_up_all(std::vector<TileWork>& work, const Batch& generous);
   Status store(TileWork& w);
   void account(const TileWork& w);
   void trim_cache();
@@ -148,9 +84,10 @@ struct MapUpdater::State {
   Status erase_in(const TileRecord& record, const Erasure& e);
   Result<Erasure> in_submap(const Erasure& e, std::uint32_t submap) const;
   Status fold(std::size_t least);
-  Status fold_some(const std::vector<Place>& places);
-  Status split_large(std::vector<Place> places);
-  Result<std::vector<Place>> split_one(const Place& place);
+  Status fold_some(const std::vector<TilePlace>& places);
+  Status replace(const TilePlace& place, const Fold& f);
+  Status split_large(std::vector<TilePlace> places);
+  Result<std::vector<TilePlace>> split_one(const TilePlace& place);
   Status holds_points() const {
     if (!schema.occupancy) return {};
     return make_error(
@@ -178,6 +115,8 @@ Status MapUpdater::State::begin() {
     directory(t->submap).add(t->key);
     stored_points += t->points;
   }
+  const bool has_account = schema.promise == PromiseKind::rms;
+  rms = RmsAccount(writer.info(), has_account ? schema.promise_value : 0, double(stored_points));
   return {};
 }
 
@@ -196,9 +135,9 @@ Status MapUpdater::State::run_all(std::size_t count, const std::function<Status(
   return {};
 }
 
-void MapUpdater::State::sort_into_tiles(std::map<Place, PointCloud, PlaceLess>& tiles, std::uint32_t submap,
-                                        const PointCloud& points) {
-  TileDirectory& tiles_of = directory(submap);
+void MapUpdater::State::sort_into_tiles(Batch& tiles, const Held& h) {
+  const PointCloud& points = h.part.points;
+  TileDirectory& tiles_of = directory(h.submap);
   std::map<TileKey, std::vector<std::uint32_t>, MortonLess> members;
   const TileKey* last = nullptr;
   std::vector<std::uint32_t>* list = nullptr;
@@ -216,9 +155,9 @@ void MapUpdater::State::sort_into_tiles(std::map<Place, PointCloud, PlaceLess>& 
     list->push_back(i);
   }
   for (const auto& [key, indices] : members) {
-    PointCloud part = points.gather(indices);
-    const auto [at, is_new] = tiles.try_emplace(Place{submap, key}, std::move(part));
-    if (!is_new) at->second.append(part);
+    std::vector<ScanPart>& scans = tiles[TilePlace{h.submap, key}];
+    if (scans.empty() || scans.back().scan != h.part.scan) scans.push_back({h.part.scan, points.like()});
+    scans.back().points.append(points.gather(indices));
   }
 }
 
@@ -231,17 +170,16 @@ Result<std::vector<Bytes>> MapUpdater::State::read_all(const TileRecord& record)
   return all;
 }
 
-Result<TileWork> MapUpdater::State::prepare(const Place& place, PointCloud points) {
+Result<TileWork> MapUpdater::State::prepare(const TilePlace& place) {
   TileWork w;
   w.place = place;
-  w.points = std::move(points);
   const TileRecord* record = writer.find(place.key, place.submap);
   w.begins = record == nullptr;
+  w.cap = settings.density_cap;
   w.allowed_rms_m = schema.promise_value;
   if (!settings.density_cap || record == nullptr) return w;
   // A tile may have more than the map on the whole, and then its own points coming again are no news.
-  if (achieved.rms_m < 0.999 * schema.promise_value)
-    w.allowed_rms_m = std::max(w.allowed_rms_m, record->errors.rms_m);
+  w.allowed_rms_m = std::max(w.allowed_rms_m, record->errors.rms_m);
   const auto known = cache.find(place);
   if (known != cache.end()) {
     w.stored = known->second.points;
@@ -251,40 +189,31 @@ Result<TileWork> MapUpdater::State::prepare(const Place& place, PointCloud point
   return w;
 }
 
-Status MapUpdater::State::look_up(TileWork& w) const {
-  if (w.stored == nullptr && !w.segments.empty()) {
-    const Box cube = w.place.key.is_unplaced() ? Box{{0, 0, 0}, {0, 0, 0}}
-                                               : tile_cube(w.place.key, schema.origin, schema.tile_size_m);
-    w.stored = make_stored_points(schema, cube.min);
-    MAPCODEC_TRY(add_segments(*w.stored, w.segments, schema));
-    w.segments.clear();
+/// @param generous  scans of tiles that may have more than the promise: where the map on the whole would not
+/// keep it, they are looked at again, with so much less.
+Status MapUpdater::State::look_up_all(std::vector<TileWork>& work, const Batch& generous) {
+  const auto look = [&](std::size_t i) { return look_up(work[i], schema, coding); };
+  MAPCODEC_TRY(run_all(work.size(), look));
+  const double limit = schema.promise_value * schema.promise_value;
+  double known = 0, known_m2 = 0, beyond_m2 = 0;
+  for (const TileWork& w : work) {
+    known += w.known;
+    known_m2 += w.known_m2;
+    beyond_m2 += std::max(0.0, w.known_m2 - limit * w.known);
   }
-  if (w.stored == nullptr) {
-    w.novelty.added.resize(w.points.size());
-    for (std::uint32_t i = 0; i < w.points.size(); ++i) w.novelty.added[i] = i;
-  } else {
-    const bool with_channels = schema.promise == PromiseKind::lossless;
-    w.novelty = with_channels ? w.stored->look(without_dropped(w.points, schema), w.allowed_rms_m)
-                              : w.stored->look(w.points, w.allowed_rms_m);
+  const double excess_m2 = generous.empty() ? 0 : rms.excess_m2(known, known_m2);
+  if (!(excess_m2 > 0)) return {};
+  const double left = std::max(0.0, 1 - excess_m2 / std::max(beyond_m2, excess_m2));
+  for (TileWork& w : work) {
+    const auto scans = generous.find(w.place);
+    if (scans == generous.end() || w.known_m2 <= limit * w.known) continue;
+    const double mean_m2 = w.known_m2 / w.known;
+    cache.erase(w.place);
+    MAPCODEC_ASSIGN(w, prepare(w.place));
+    w.allowed_rms_m = std::sqrt(limit + left * (mean_m2 - limit));
+    w.scans = scans->second;
   }
-  return {};
-}
-
-Status MapUpdater::State::work_on(TileWork& w) const {
-  MAPCODEC_TRY(look_up(w));
-  if (w.novelty.added.empty()) return {};
-  const bool all = w.novelty.added.size() == w.points.size();
-  const PointCloud some = all ? PointCloud{} : w.points.gather(w.novelty.added);
-  if (settings.for_good && w.begins) {
-    MAPCODEC_ASSIGN(w.coded, encode_for_good(w.points, schema, false));
-    return {};
-  }
-  const PointCloud& added = all ? w.points : some;
-  MAPCODEC_ASSIGN(EncodedTile t, encode_tile(added, coding.schema, coding.tiles));
-  if (w.stored != nullptr) w.stored->add(as_decoded(added, schema, coding), true);
-  mark_pending(t.bytes);
-  w.coded = std::move(t);
-  return {};
+  return run_all(work.size(), look);
 }
 
 Status MapUpdater::State::store(TileWork& w) {
@@ -295,7 +224,7 @@ Status MapUpdater::State::store(TileWork& w) {
   const TileRecord* record = writer.find(w.place.key, w.place.submap);
   const double before = record == nullptr ? 0 : double(record->points);
   const TileErrors old = record == nullptr ? TileErrors{} : record->errors;
-  const TileErrors errors = joint(old, before, before, w, farthest_known(schema));
+  const TileErrors errors = joint_errors(old, before, before, w, farthest_known(schema));
   report.bytes += w.coded->bytes.size();
   ++report.tiles_touched;
   if (record == nullptr) {
@@ -311,16 +240,23 @@ Status MapUpdater::State::store(TileWork& w) {
 
 /// The map's figures follow those of its points.
 void MapUpdater::State::account(const TileWork& w) {
-  achieved = joint(achieved, double(input_points), double(stored_points), w, farthest_known(schema));
-  input_points += w.points.size();
-  stored_points += w.novelty.added.size();
-  report.points_added += w.novelty.added.size();
-  report.points_known += w.points.size() - w.novelty.added.size();
+  achieved = joint_errors(achieved, double(input_points), double(stored_points), w, farthest_known(schema));
+  if (schema.promise == PromiseKind::rms) {
+    const EncodedTile none;
+    const EncodedTile& t = w.coded ? *w.coded : none;
+    rms.add({w.added_points, w.known, w.known_m2, t.rms_forward_m, t.rms_backward_m, is_pending(t.bytes)});
+    achieved.rms_m = rms.rms_m();
+  }
+  const auto added = static_cast<std::uint64_t>(w.added_points), known = static_cast<std::uint64_t>(w.known);
+  input_points += added + known;
+  stored_points += added;
+  report.points_added += added;
+  report.points_known += known;
 }
 
 void MapUpdater::State::trim_cache() {
   std::uint64_t bytes = 0;
-  std::vector<std::pair<std::uint64_t, Place>> by_age;
+  std::vector<std::pair<std::uint64_t, TilePlace>> by_age;
   for (const auto& [place, known] : cache) {
     bytes += known.points->bytes();
     by_age.emplace_back(known.used, place);
@@ -337,19 +273,24 @@ void MapUpdater::State::trim_cache() {
 }
 
 Status MapUpdater::State::flush() {
-  std::map<Place, PointCloud, PlaceLess> tiles;
-  for (const auto& [submap, points] : held) sort_into_tiles(tiles, submap, points);
+  Batch tiles;
+  for (const Held& h : held) sort_into_tiles(tiles, h);
   held.clear();
   held_points = 0;
   ++clock;
   std::vector<TileWork> work;
-  for (auto& [place, points] : tiles) {
-    MAPCODEC_ASSIGN(TileWork w, prepare(place, std::move(points)));
+  Batch generous;
+  for (auto& [place, scans] : tiles) {
+    MAPCODEC_ASSIGN(TileWork w, prepare(place));
+    if (w.allowed_rms_m > schema.promise_value) generous[place] = scans;
+    w.scans = std::move(scans);
     work.push_back(std::move(w));
   }
   MAPCODEC_TRY(stopped());
-  MAPCODEC_TRY(run_all(work.size(), [&](std::size_t i) { return work_on(work[i]); }));
-  std::vector<Place> touched;
+  MAPCODEC_TRY(look_up_all(work, generous));
+  MAPCODEC_TRY(run_all(
+      work.size(), [&](std::size_t i) { return code_added(work[i], schema, coding, settings.for_good); }));
+  std::vector<TilePlace> touched;
   for (TileWork& w : work) {
     MAPCODEC_TRY(store(w));
     touched.push_back(w.place);
@@ -360,24 +301,24 @@ Status MapUpdater::State::flush() {
 }
 
 /// Tiles that grew far beyond the others, and then their parts.
-Status MapUpdater::State::split_large(std::vector<Place> places) {
+Status MapUpdater::State::split_large(std::vector<TilePlace> places) {
   while (!places.empty()) {
-    const Place place = places.back();
+    const TilePlace place = places.back();
     places.pop_back();
     const TileRecord* record = writer.find(place.key, place.submap);
     if (record == nullptr || record->points <= settings.split_points || place.key.level == 0) continue;
     MAPCODEC_TRY(stopped());
-    MAPCODEC_ASSIGN(const std::vector<Place> parts, split_one(place));
+    MAPCODEC_ASSIGN(const std::vector<TilePlace> parts, split_one(place));
     places.insert(places.end(), parts.begin(), parts.end());
   }
   return {};
 }
 
-Result<std::vector<Place>> MapUpdater::State::split_one(const Place& place) {
+Result<std::vector<TilePlace>> MapUpdater::State::split_one(const TilePlace& place) {
   const TileRecord record = *writer.find(place.key, place.submap);
   MAPCODEC_ASSIGN(const std::vector<Bytes> segments, read_all(record));
   MAPCODEC_ASSIGN(const auto parts, split_tile(place.key, segments, schema, coding, record.errors));
-  std::vector<Place> places;
+  std::vector<TilePlace> places;
   if (!parts) return places;
   cache.erase(place);
   ++report.tiles_split;
@@ -387,6 +328,7 @@ Result<std::vector<Place>> MapUpdater::State::split_one(const Place& place) {
   for (const TilePart& part : *parts) {
     tiles_of.add(part.key);
     report.bytes += part.tile.bytes.size();
+    rms.fold(double(part.tile.coded_points), part.tile.forward_m, part.tile.backward_m);
     places.push_back({place.submap, part.key});
     MAPCODEC_TRY(writer.add(part.key, part.tile.codec, part.tile.points, part.tile.bounds, part.tile.errors,
                             part.tile.bytes, place.submap));
@@ -429,56 +371,63 @@ Status MapUpdater::State::erase_in(const TileRecord& tile, const Erasure& e) {
   return writer.extend(record.key, cloud.size(), record.bounds, record.errors, payload, record.submap);
 }
 
-Status MapUpdater::State::fold_some(const std::vector<Place>& places) {
-  std::vector<std::vector<Bytes>> segments;
-  for (const Place& p : places) {
-    MAPCODEC_ASSIGN(std::vector<Bytes> all, read_all(*writer.find(p.key, p.submap)));
-    segments.push_back(std::move(all));
+Status MapUpdater::State::fold_some(const std::vector<TilePlace>& places) {
+  std::vector<FoldTask> tasks;
+  for (const TilePlace& p : places) {
+    const TileRecord& record = *writer.find(p.key, p.submap);
+    MAPCODEC_ASSIGN(std::vector<Bytes> segments, read_all(record));
+    tasks.push_back({std::move(segments), record.errors, record.bounds});
   }
-  std::vector<std::optional<Fold>> folds(places.size());
-  MAPCODEC_TRY(run_all(places.size(), [&](std::size_t i) -> Status {
-    const TileRecord& record = *writer.find(places[i].key, places[i].submap);
-    MAPCODEC_ASSIGN(folds[i], fold_tile(segments[i], schema, record.errors, record.bounds));
-    return {};
-  }));
+  const RunEach run = [this](std::size_t count, const std::function<Status(std::size_t)>& body) {
+    return run_all(count, body);
+  };
+  MAPCODEC_ASSIGN(const auto folds, fold_tiles(tasks, schema, rms.folding_rms_m(), run));
   for (std::size_t i = 0; i < places.size(); ++i) {
-    if (!folds[i]) continue;
-    const Fold& f = *folds[i];
-    changed = true;
-    ++report.tiles_folded;
-    report.bytes += f.bytes.size();
-    cache.erase(places[i]);
-    MAPCODEC_TRY(f.points == 0 ? writer.remove(places[i].key, places[i].submap)
-                               : writer.add(places[i].key, f.codec, f.points, f.bounds, f.errors, f.bytes,
-                                            places[i].submap));
+    if (folds[i]) MAPCODEC_TRY(replace(places[i], *folds[i]));
   }
   return stopped();
 }
 
+Status MapUpdater::State::replace(const TilePlace& place, const Fold& f) {
+  changed = true;
+  ++report.tiles_folded;
+  report.bytes += f.bytes.size();
+  cache.erase(place);
+  rms.fold(double(f.coded_points), f.forward_m, f.backward_m);
+  if (f.points == 0) return writer.remove(place.key, place.submap);
+  return writer.add(place.key, f.codec, f.points, f.bounds, f.errors, f.bytes, place.submap);
+}
+
 Status MapUpdater::State::fold(std::size_t least) {
-  std::vector<Place> places;
+  std::vector<TilePlace> places;
+  std::uint64_t together = 0;
+  const auto fold_them = [&]() -> Status {
+    together = 0;
+    return places.empty() ? Status{} : fold_some(std::exchange(places, {}));
+  };
+  std::vector<TilePlace> all;
   for (const TileRecord* t : writer.tiles()) {
-    if (t->submap != octree && t->segments.size() >= least) places.push_back({t->submap, t->key});
+    if (t->submap != octree && t->segments.size() >= least) all.push_back({t->submap, t->key});
   }
-  const std::size_t at_once = 4 * std::size_t(arena.threads());
-  for (std::size_t i = 0; i < places.size(); i += at_once) {
-    const auto begin = places.begin() + static_cast<std::ptrdiff_t>(i);
-    const auto end = places.begin() + static_cast<std::ptrdiff_t>(std::min(places.size(), i + at_once));
-    MAPCODEC_TRY(fold_some({begin, end}));
+  // So many at once share the promise; never by the number of threads, which must not change the bytes.
+  for (const TilePlace& p : all) {
+    const std::uint64_t points = writer.find(p.key, p.submap)->points;
+    if (together + points > settings.batch_points) MAPCODEC_TRY(fold_them());
+    places.push_back(p);
+    together += points;
   }
+  MAPCODEC_TRY(fold_them());
+  if (least <= 1) rms.all_folded();
   if (report.tiles_folded == 0) return {};
-  double points = 0, squares = 0, color = 0;
+  double points = 0, color = 0;
   for (const TileRecord* t : writer.tiles()) {
     if (t->submap == octree) continue;
     points += double(t->points);
-    squares += double(t->points) * t->errors.rms_m * t->errors.rms_m;
     color += double(t->points) * t->errors.color_error;
     achieved.max_axis_error_m = std::max(achieved.max_axis_error_m, t->errors.max_axis_error_m);
   }
-  if (points > 0) {
-    achieved.rms_m = std::max(achieved.rms_m, std::sqrt(squares / points));
-    achieved.color_error = std::max(achieved.color_error, color / points);
-  }
+  if (points > 0) achieved.color_error = std::max(achieved.color_error, color / points);
+  if (schema.promise == PromiseKind::rms) achieved.rms_m = rms.rms_m();
   return {};
 }
 
@@ -545,7 +494,7 @@ Status MapUpdater::set_stamps(std::uint32_t submap, double first_s, double last_
   return state_->writer.set_info(std::move(info));
 }
 
-Status MapUpdater::insert(PointCloud points, std::uint32_t submap) {
+Status MapUpdater::insert(PointCloud points, std::uint32_t submap, ScanEnd end) {
   State& s = *state_;
   MAPCODEC_TRY(s.holds_points());
   std::uint64_t dropped = 0;
@@ -553,16 +502,21 @@ Status MapUpdater::insert(PointCloud points, std::uint32_t submap) {
   s.report.dropped_points += dropped;
   s.report.points_in += fitted.size();
   s.held_points += fitted.size();
-  if (!fitted.empty()) s.held.emplace_back(submap, std::move(fitted));
+  if (!fitted.empty()) s.held.push_back({submap, {s.scan, std::move(fitted)}});
+  if (end == ScanEnd::here) ++s.scan;
   return s.held_points >= s.settings.batch_points ? flush() : Status{};
 }
 
+void MapUpdater::end_scan() {
+  ++state_->scan;
+}
+
 Status MapUpdater::State::erase(const std::optional<Erasure>& e, std::optional<std::uint32_t> submap) {
-  std::vector<Place> places;
+  std::vector<TilePlace> places;
   for (const TileRecord* t : writer.tiles()) {
     if (t->submap != octree && (!submap || t->submap == *submap)) places.push_back({t->submap, t->key});
   }
-  for (const Place& p : places) {
+  for (const TilePlace& p : places) {
     MAPCODEC_TRY(stopped());
     if (!e) {
       changed = true;
@@ -621,6 +575,8 @@ Result<UpdateReport> MapUpdater::commit(std::int64_t timestamp_s) {
   info.input_bytes = s.input_bytes;
   info.extras.erase(kLevelsExtra);  // measured on what the map was
   if (s.settings.density_cap && report.points_in > 0) info.extras[kDensityCapExtra] = Bytes{1};
+  info.extras.erase(kRmsAccountExtra);
+  if (auto account = s.rms.extra()) info.extras[kRmsAccountExtra] = *std::move(account);
   for (auto& [name, value] : s.extras) info.extras[name] = std::move(value);
   s.extras.clear();
   MAPCODEC_TRY(s.writer.set_info(std::move(info)));

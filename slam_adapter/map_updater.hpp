@@ -78,11 +78,14 @@ class MapUpdater {
   /// When the scans of a submap were taken [s since epoch]. Errors: InvalidArgument (no such submap).
   [[nodiscard]] Status set_stamps(std::uint32_t submap, double first_s, double last_s);
 
+  enum class ScanEnd { here, later };
+  /// @param end  `later`: more points of the same scan come next. Scans are held against those before them,
+  /// as if each had been committed alone; points of one scan are not held against each other.
   /// @param points  [m, submap frame]; channels in any order. What the map does not keep is left out; what it
   /// keeps must be there. Points that are not finite are dropped and counted (lossless maps: kept).
   /// Errors: Malformed (a kept channel is missing or of another type, another constant), InvalidArgument
   /// (coordinates that a lossless map cannot hold), Unsupported (a map of an octree alone), those of `flush`.
-  [[nodiscard]] Status insert(PointCloud points, std::uint32_t submap = 0);
+  [[nodiscard]] Status insert(PointCloud points, std::uint32_t submap = 0, ScanEnd end = ScanEnd::here);
   /// Erases points of one submap, or of all (then `e` is in the map's frame, and a box needs submaps that are
   /// not rotated; nothing: all points). Tiles that are left empty go away.
   /// Errors: InvalidArgument (a channel that the map does not keep, a rotated box), Unsupported (a map of an
@@ -90,6 +93,8 @@ class MapUpdater {
   [[nodiscard]] Status erase(const std::optional<Erasure>& e, std::optional<std::uint32_t> submap);
   /// Folds the pending segments of tiles that have at least `least` (1: all).
   [[nodiscard]] Status fold(std::size_t least = 1);
+  /// What was inserted to be continued is complete.
+  void end_scan();
   /// For the record: size of what was inserted.
   void add_input_bytes(std::uint64_t bytes);
   /// A fact of the next revision (MapInfo::extras). @param alone  makes one even if nothing else changed.

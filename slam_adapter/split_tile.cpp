@@ -34,6 +34,11 @@ Result<Fold> encode_part(PointCloud points, const MapSchema& schema, const Pendi
   f.bounds = t.bounds;
   f.errors = exact || as_pending ? errors : joint_errors(errors, t.errors, 1);
   f.bytes = std::move(t.bytes);
+  if (!exact && !as_pending) {
+    f.coded_points = t.points;
+    f.forward_m = t.rms_forward_m;
+    f.backward_m = t.rms_backward_m;
+  }
   return f;
 }
 

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <sstream>
 
+#include "maps/moved_points.hpp"
 #include "slam_adapter/create_map.hpp"
 #include "slam_adapter/formats/formats.hpp"
 #include "slam_adapter/map_file.hpp"
@@ -43,9 +44,9 @@ Status check_promise(const MapSchema& schema, const UpdateRequest& r) {
   return {};
 }
 
-void move_points(PointCloud& cloud, const RigidMotion& pose) {
+void place(PointCloud& cloud, const RigidMotion& pose) {
   if (pose.is_identity()) return;
-  for (Vec3& p : cloud.xyz) p = pose.apply(p);
+  move_points(cloud, pose);
   cloud.coordinates = {CoordinateFormat::Kind::f64, {1, 1, 1}, {0, 0, 0}};
 }
 
@@ -66,10 +67,13 @@ Status insert_source(MapUpdater& map, PointSource& source, const RigidMotion& po
   PointCloud block;
   for (;;) {
     MAPCODEC_ASSIGN(const bool more, source.next(block));
-    if (!more) return {};
+    if (!more) {
+      map.end_scan();
+      return {};
+    }
     PointCloud points = std::exchange(block, {});
-    move_points(points, pose);
-    MAPCODEC_TRY(map.insert(std::move(points), submap));
+    place(points, pose);
+    MAPCODEC_TRY(map.insert(std::move(points), submap, MapUpdater::ScanEnd::later));
   }
 }
 

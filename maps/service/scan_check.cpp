@@ -3,6 +3,7 @@
 
 #include <unordered_set>
 
+#include "maps/moved_points.hpp"
 #include "maps/service/writer_table.hpp"
 
 namespace mapcodec {
@@ -72,12 +73,12 @@ Status check_spread(const PointCloud& points, const Box& box, const MapSchema& s
   return {};
 }
 
-void move_points(Scan& scan) {
+void place(Scan& scan) {
   if (!scan.T_submap_scan) return;
   const RigidMotion motion(scan.T_submap_scan->translation_m, scan.T_submap_scan->rotation_xyzw);
   scan.T_submap_scan.reset();
   if (motion.is_identity()) return;
-  for (Vec3& p : scan.points.xyz) p = motion.apply(p);
+  move_points(scan.points, motion);
   scan.points.coordinates = {CoordinateFormat::Kind::f64, {1, 1, 1}, {0, 0, 0}};
 }
 
@@ -93,7 +94,7 @@ Status prepare_scan(Scan& scan, const MapSchema& schema, const ServiceSettings& 
   MAPCODEC_TRY(coding.check(scan.points, schema));
   if (scan.points.empty()) return {};
   MAPCODEC_TRY(finite_bounds(scan.points));
-  move_points(scan);
+  place(scan);
   MAPCODEC_ASSIGN(const Box box, finite_bounds(scan.points));
   return check_spread(scan.points, box, schema);
 }

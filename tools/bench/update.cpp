@@ -13,6 +13,7 @@
 #include "slam_adapter/map_file.hpp"
 #include "slam_adapter/update.hpp"
 #include "tools/bench/bench.hpp"
+#include "tools/bench/log_scans.hpp"
 #include "tools/peers/grid.hpp"
 
 namespace mapcodec {
@@ -39,6 +40,12 @@ struct Sequence {
   std::vector<std::string> files;
   double unit_m = 1;
 };
+
+bool is_wanted(const BenchSettings& settings, const std::string& name) {
+  return settings.files.empty() ||
+         std::any_of(settings.files.begin(), settings.files.end(),
+                     [&](const std::string& part) { return name.find(part) != std::string::npos; });
+}
 
 /// Files below the data folder by the folder they lie in and how their names begin.
 std::vector<std::string> files_of(const std::string& data, const std::string& folder,
@@ -74,6 +81,17 @@ std::vector<std::string> single_scans(const std::vector<std::string>& files, con
   return folders;
 }
 
+/// Logs are taken apart only where they are asked for; what cannot be read is said.
+void add_log(std::vector<Sequence>& all, const BenchSettings& settings, const std::string& scratch,
+             const std::string& name, const std::string& begin) {
+  if (!is_wanted(settings, name)) return;
+  const std::vector<std::string> logs = files_of(settings.data, "mrpt/derived", begin);
+  if (logs.empty()) return;
+  auto scans = bench::scans_of_log(logs.front(), scratch + "/" + begin);
+  if (!scans.ok()) settings.say(name + ": " + scans.error().message);
+  if (scans.ok()) all.push_back({name, *std::move(scans), 1});
+}
+
 std::vector<Sequence> find_sequences(const BenchSettings& settings, const std::string& scratch) {
   std::vector<Sequence> all;
   all.push_back({"3DTK corridor", single_scans(files_of(settings.data, "3DTK/dat", "scan"), scratch), 0.01});
@@ -82,7 +100,9 @@ std::vector<Sequence> find_sequences(const BenchSettings& settings, const std::s
   all.push_back({"small_gicp street", files_of(settings.data, "small_gicp/data", "source"), 1});
   const auto target = files_of(settings.data, "small_gicp/data", "target");
   all.back().files.insert(all.back().files.end(), target.begin(), target.end());
-  std::erase_if(all, [](const Sequence& s) { return s.files.size() < 2; });
+  add_log(all, settings, scratch, "MRPT simplemap", "hku_mlcc");
+  add_log(all, settings, scratch, "MRPT HDL-32", "sample_velodyne");
+  std::erase_if(all, [&](const Sequence& s) { return s.files.size() < 2 || !is_wanted(settings, s.name); });
   return all;
 }
 
@@ -222,13 +242,7 @@ Status bench_update(const BenchSettings& settings) {
   report.line("## Scan after scan, compacted, beside the map made at once\n");
   report.table(
       {"scans", "promise", "map", "size x", "points x", "RMS mm", "at once mm", "ms a scan", "compact s"});
-  std::vector<Sequence> sequences = find_sequences(settings, scratch);
-  std::erase_if(sequences, [&](const Sequence& s) {
-    return !settings.files.empty() &&
-           std::none_of(settings.files.begin(), settings.files.end(),
-                        [&](const auto& f) { return s.name.find(f) != std::string::npos; });
-  });
-  for (const Sequence& s : sequences) {
+  for (const Sequence& s : find_sequences(settings, scratch)) {
     for (const double rms : {0.01, 0.03})
       MAPCODEC_TRY(measure_sequence(s, PromiseKind::rms, rms, report, settings));
     MAPCODEC_TRY(measure_sequence(s, PromiseKind::max_error, 0.01, report, settings));

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What updates left pending in tiles becomes part of them for good.
+#pragma once
+
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "slam_adapter/fold_tile.hpp"
+#include "slam_adapter/rms_coding.hpp"
+
+namespace mapcodec {
+
+struct FoldTask {
+  std::vector<Bytes> segments;  ///< base, then deltas
+  TileErrors errors;
+  Box bounds;  ///< [m, submap frame]
+};
+
+/// Folds the pending segments of tiles, and erasures where that loses nothing. Where positions lie on the
+/// map's lattice (max_error) or are exact (lossless), all of a tile becomes one base; else (rms, or colours
+/// within a bound) segments that were folded before stay bit for bit, and all pending ones together become
+/// one more. The promise of an rms holds for the folded points of all tiles together.
+/// @param rms_m  that coding pending points may add; only for rms.
+/// @return per tile: nothing if there is nothing to fold; `points` 0 if nothing is left of the tile.
+/// Same input, same bytes, however many threads `run` uses.
+/// Errors: those of decoding and encoding; PromiseBroken if no coding keeps it.
+[[nodiscard]] Result<std::vector<std::optional<Fold>>> fold_tiles(std::span<const FoldTask> tasks,
+                                                                  const MapSchema& schema, double rms_m,
+                                                                  const RunEach& run);
+
+}  // namespace mapcodec
