@@ -30,6 +30,9 @@ std::uint8_t usual_level(const std::vector<const TileRecord*>& tiles) {
   return most == points.end() ? 0 : most->first;
 }
 
+// Stored points that are decoded at the same time, besides those that are known already.
+constexpr std::uint64_t kPointsTogether = 3000000;
+
 }  // namespace
 
 struct MapUpdater::State {
@@ -71,6 +74,8 @@ struct MapUpdater::State {
   }
   Status flush();
   using Batch = std::map<TilePlace, std::vector<ScanPart>, TilePlaceLess>;
+  Batch take_some(Batch& tiles) const;
+  Status flush_some(Batch tiles);
   void sort_into_tiles(Batch& tiles, const Held& held);
   TileDirectory& directory(std::uint32_t submap);
   Result<std::vector<Bytes>> read_all(const TileRecord& record) const;
@@ -272,12 +277,31 @@ void MapUpdater::State::trim_cache() {
   }
 }
 
+/// Moves the first tiles out, as many as are looked at together: what is stored of them is decoded for that.
+MapUpdater::State::Batch MapUpdater::State::take_some(Batch& tiles) const {
+  Batch some;
+  std::uint64_t points = 0;
+  while (!tiles.empty()) {
+    const TilePlace& place = tiles.begin()->first;
+    const TileRecord* record = writer.find(place.key, place.submap);
+    points += record == nullptr ? 0 : record->points;
+    if (!some.empty() && points > kPointsTogether) break;
+    some.insert(tiles.extract(tiles.begin()));
+  }
+  return some;
+}
+
 Status MapUpdater::State::flush() {
   Batch tiles;
   for (const Held& h : held) sort_into_tiles(tiles, h);
   held.clear();
   held_points = 0;
   ++clock;
+  while (!tiles.empty()) MAPCODEC_TRY(flush_some(take_some(tiles)));
+  return stopped();
+}
+
+Status MapUpdater::State::flush_some(Batch tiles) {
   std::vector<TileWork> work;
   Batch generous;
   for (auto& [place, scans] : tiles) {
@@ -295,9 +319,10 @@ Status MapUpdater::State::flush() {
     MAPCODEC_TRY(store(w));
     touched.push_back(w.place);
   }
+  work.clear();
   MAPCODEC_TRY(split_large(std::move(touched)));
   trim_cache();
-  return stopped();
+  return {};
 }
 
 /// Tiles that grew far beyond the others, and then their parts.

@@ -13,7 +13,8 @@ namespace {
 
 using Watch = peers::StopWatch;
 
-constexpr double kStride = 1;  // [m] between the scans of a writer
+constexpr double kStride = 1;                         // [m] between the scans of a writer
+constexpr std::uint64_t kPlaces = 40, kVariants = 3;  // of a writer that comes to the same places
 
 PoseChange pose_at(double x, double y, std::mt19937& random) {
   const double half = 0.01 * (double(random()) / 4294967296.0 - 0.5);
@@ -41,6 +42,14 @@ void wait_until(double seconds, const Watch& watch) {
   if (early > 0) std::this_thread::sleep_for(std::chrono::duration<double>(early));
 }
 
+/// What lies around a place is removed from the map.
+Status clear(const MapClient& client, double x, double y) {
+  Erasure around;
+  around.sphere = Erasure::Sphere{{x, y, 0}, 10};
+  const auto revision = client.erase(around, std::nullopt);
+  return revision.ok() ? Status{} : Status(revision.error());
+}
+
 /// Sends until told to stop. Durable within a window: what is counted was acknowledged.
 Status write(Shared& shared, const std::string& url, const PointCloud& scan, int number,
              const LoadSettings& s) {
@@ -55,7 +64,12 @@ Status write(Shared& shared, const std::string& url, const PointCloud& scan, int
     wait_until(s.scans_per_second > 0 ? double(scans) / s.scans_per_second : 0, watch);
     Scan message;
     message.points = scan;
-    const double along = s.same_places ? double(scans % 40) : double(scans);
+    const double along = s.same_places ? double(scans % kPlaces) : double(scans);
+    if (s.same_places) {
+      // The map comes to an end: each place has a few poses, and now and then something is taken away.
+      random.seed(static_cast<unsigned>(scans % (kPlaces * kVariants)));
+      if (scans % kPlaces == kPlaces - 1) MAPCODEC_TRY(clear(client, kStride * along / 2, 200.0 * number));
+    }
     message.T_submap_scan = pose_at(kStride * along, 200.0 * number, random);
     const Watch one(Watch::Kind::wall);
     MAPCODEC_TRY(sender->send(std::move(message)));

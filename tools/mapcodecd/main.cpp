@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // mapcodecd: serves a folder of maps. In the foreground, logs to stderr, ends on SIGTERM.
+#include <malloc.h>
+
 #include <CLI/CLI.hpp>
 #include <csignal>
 #include <cstdio>
@@ -52,6 +54,17 @@ int serve(const DaemonSettings& settings) {
 
 }  // namespace
 
+namespace {
+
+/// glibc keeps for each thread what it freed, and learns to keep larger and larger blocks: what one large
+/// commit needed once would stay with a service that runs for months.
+void give_memory_back() {
+  ::mallopt(M_ARENA_MAX, 4);
+  ::mallopt(M_MMAP_THRESHOLD, 1 << 20);
+}
+
+}  // namespace
+
 int main(int argc, char** argv) {
   CLI::App app{"mapcodecd: a folder of maps, served over the network"};
   CommandLine line;
@@ -65,6 +78,7 @@ int main(int argc, char** argv) {
       return fail(make_error(mapcodec::ErrorCode::kInvalidArgument,
                              "--data is needed, or storage.folder in --config"));
     }
+    give_memory_back();
     return line.verb ? line.verb(*settings) : serve(*settings);
   } catch (const std::exception& e) {
     return fail(make_error(mapcodec::ErrorCode::kLimitExceeded, e.what()));
