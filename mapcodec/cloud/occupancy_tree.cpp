@@ -30,26 +30,4 @@ std::uint64_t OccupancyTree::leaf_count(Cell state) const {
   return n;
 }
 
-Cell cell_of_value(std::uint32_t float_bits) {
-  return std::bit_cast<float>(float_bits) < 0 ? Cell::free : Cell::occupied;
-}
-
-void NodeSummary::add(std::uint32_t value, const OccupancyColor& color) {
-  const auto v = std::bit_cast<float>(value);
-  if (v > largest_) largest_ = v;
-  if (color == kNoColor) return;
-  ++colored_;
-  for (std::size_t d = 0; d < 3; ++d) sum_[d] += color[d];
-}
-
-std::uint32_t NodeSummary::value() const {
-  return std::bit_cast<std::uint32_t>(largest_);
-}
-
-OccupancyColor NodeSummary::color() const {
-  if (colored_ == 0) return kNoColor;
-  return {static_cast<std::uint8_t>(sum_[0] / colored_), static_cast<std::uint8_t>(sum_[1] / colored_),
-          static_cast<std::uint8_t>(sum_[2] / colored_)};
-}
-
 }  // namespace mapcodec

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <bit>
 #include <cstdint>
 #include <vector>
 
@@ -26,7 +27,11 @@ enum class Cell : std::uint8_t { unknown = 0, free = 1, occupied = 2, inner = 3 
 
 using OccupancyColor = std::array<std::uint8_t, 3>;       ///< red, green, blue
 inline constexpr OccupancyColor kNoColor{255, 255, 255};  ///< OctoMap's "not set"
-using CellCorner = std::array<std::uint32_t, 3>;          ///< x, y, z in voxels
+/// The comparison, without a call for three bytes.
+[[nodiscard]] constexpr bool has_color(const OccupancyColor& c) {
+  return (c[0] & c[1] & c[2]) != 255;
+}
+using CellCorner = std::array<std::uint32_t, 3>;  ///< x, y, z in voxels
 
 inline constexpr unsigned kOccupancyHeight = 16;  ///< OctoMap's keys have 16 bits an axis, centre 32768
 
@@ -74,15 +79,27 @@ struct OccupancyTree {
 }
 
 /// Of a leaf with this log-odds.
-[[nodiscard]] Cell cell_of_value(std::uint32_t float_bits);
+[[nodiscard]] constexpr Cell cell_of_value(std::uint32_t float_bits) {
+  return std::bit_cast<float>(float_bits) < 0 ? Cell::free : Cell::occupied;
+}
 
 /// What OctoMap gives an inner node: the largest of its children's values, the mean of their colours.
 /// Collect all children, then read.
 class NodeSummary {
  public:
-  void add(std::uint32_t value, const OccupancyColor& color);
-  [[nodiscard]] std::uint32_t value() const;
-  [[nodiscard]] OccupancyColor color() const;
+  void add(std::uint32_t value, const OccupancyColor& color) {
+    const auto v = std::bit_cast<float>(value);
+    if (v > largest_) largest_ = v;
+    if (!has_color(color)) return;
+    ++colored_;
+    for (std::size_t d = 0; d < 3; ++d) sum_[d] += color[d];
+  }
+  [[nodiscard]] std::uint32_t value() const { return std::bit_cast<std::uint32_t>(largest_); }
+  [[nodiscard]] OccupancyColor color() const {
+    if (colored_ == 0) return kNoColor;
+    return {static_cast<std::uint8_t>(sum_[0] / colored_), static_cast<std::uint8_t>(sum_[1] / colored_),
+            static_cast<std::uint8_t>(sum_[2] / colored_)};
+  }
 
  private:
   float largest_ = -3.402823466e+38f;
@@ -100,10 +117,9 @@ void summarise_nodes(Tree& tree, F&& f) {
     std::size_t leaf = 0, inner = 0;
     for (std::size_t i = 0; i < tree.levels[h].nodes.size(); ++i) {
       NodeSummary s;
-      for (unsigned c = 0; c < 8; ++c) {
-        const Cell cell = cell_of(tree.levels[h].nodes[i], c);
-        if (cell == Cell::unknown) continue;
-        const bool is_inner = cell == Cell::inner;
+      const std::uint32_t node = tree.levels[h].nodes[i];
+      for (std::uint32_t left = (node | node >> 1) & 0x5555; left != 0; left &= left - 1) {
+        const bool is_inner = (node >> std::countr_zero(left) & 3) == 3;
         const std::size_t k = is_inner ? inner++ : leaf++;
         const auto& colors = is_inner ? below.node_colors : below.leaf_colors;
         s.add((is_inner ? below.node_values : below.leaf_values)[k], colors.empty() ? kNoColor : colors[k]);

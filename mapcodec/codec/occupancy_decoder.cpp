@@ -7,18 +7,30 @@
 #include "mapcodec/codec/occupancy_layout.hpp"
 #include "mapcodec/codec/tile_sections.hpp"
 #include "mapcodec/entropy/range_decoder.hpp"
+#include "mapcodec/entropy/rans_decoder.hpp"
 
 namespace mapcodec {
 namespace {
 
 using namespace occupancy;
 
-struct DecoderSide {
-  static constexpr bool kDecodes = true;
+struct BitDecoder {
+  static constexpr bool kDecodes = true, kValued = false;
   RangeDecoder in;
 
   bool bit(bool, std::uint32_t p1) { return in.decode(p1); }
-  std::uint64_t raw(std::uint64_t, int count) { return in.decode_raw(count); }
+  [[nodiscard]] bool ok() const { return in.ok(); }
+};
+
+struct SymbolDecoder {
+  static constexpr bool kDecodes = true, kValued = true;
+  RansDecoder in;
+
+  bool bit(bool, BitModel& model) { return in.decode(model); }
+  std::uint32_t nibble(std::uint32_t, NibbleModel& model) { return in.decode(model); }
+  std::uint32_t nibble(std::uint32_t, NibbleModel& a, NibbleModel& b) { return in.decode(a, b); }
+  std::uint32_t raw(std::uint32_t, int count) { return in.decode_raw(count); }
+  static std::uint32_t rank_of(std::uint32_t) { return 0; }
   [[nodiscard]] bool ok() const { return in.ok(); }
 };
 
@@ -39,20 +51,23 @@ Result<TileKey> read_key(ByteReader& in) {
 }
 
 Result<ValueTable> read_table(ByteReader& in, std::uint64_t leaves) {
-  ValueTable t;
   const std::uint64_t head = in.varint();
-  t.escapes = (head & 1) != 0;
   const std::uint64_t count = head >> 1;
-  if (!in.ok() || count > kMostValues || count > in.left() || count > leaves || (count == 0 && !t.escapes))
+  if (!in.ok() || count > kMostValues || count > in.left() || count > leaves || head == 0)
     return malformed("wrong number of log-odds", in);
+  std::vector<ValueTable::Entry> entries;
   std::uint64_t v = 0;
   for (std::uint64_t i = 0; i < count; ++i) {
     v += in.varint() + (i > 0 ? 1 : 0);
     if (v > 0xffffffffu) return malformed("log-odds out of range", in);
-    t.values.push_back(from_ordered(static_cast<std::uint32_t>(v)));
+    entries.push_back({from_ordered(static_cast<std::uint32_t>(v)), in.u8()});
+    if (entries.back().weight < 1 || entries.back().weight > 32)
+      return malformed("log-odds without a weight", in);
   }
+  const std::uint8_t escapes = (head & 1) != 0 ? in.u8() : 0;
   MAPCODEC_TRY(in.status("occupancy tile"));
-  return t;
+  if (escapes > 32 || ((head & 1) != 0 && escapes == 0)) return malformed("log-odds without a weight", in);
+  return ValueTable(std::move(entries), escapes);
 }
 
 /// Memory that a tree of so many nodes takes while it is decoded.
@@ -116,6 +131,9 @@ Result<OccupancyPiece> decode_occupancy(ByteSpan section, std::uint64_t leaves, 
   ByteReader in(section);
   const std::uint8_t first = in.u8();
   const Form form = Form::from(first);
+  if (std::uint8_t(first | Form::kSymbols) == form.byte() && first != form.byte())
+    return make_error(ErrorCode::kUnsupported,
+                      "occupancy tile: log-odds in the code of an earlier version; compress the .ot again");
   if (first != form.byte()) return malformed("unknown form", in);
   OccupancyPiece piece;
   MAPCODEC_ASSIGN(piece.key, read_key(in));
@@ -129,8 +147,14 @@ Result<OccupancyPiece> decode_occupancy(ByteSpan section, std::uint64_t leaves, 
   piece.tree.kind = form.kind;
   piece.tree.root = form.root;
   piece.tree.height = piece.key.level;
-  const DecoderSide side{RangeDecoder(in.raw(in.left()))};
-  MAPCODEC_TRY(Stream<DecoderSide>(side, head, table).run(piece.tree));
+  if (form.kind == OccupancyKind::binary) {
+    BitDecoder side{RangeDecoder(in.raw(in.left()))};
+    MAPCODEC_TRY(Stream<BitDecoder>(side, head, table).run(piece.tree));
+    return piece;
+  }
+  SymbolDecoder side{RansDecoder(in.raw(in.left()))};
+  MAPCODEC_TRY(Stream<SymbolDecoder>(side, head, table).run(piece.tree));
+  if (!side.in.finished()) return malformed("its code ends where it should not", in);
   return piece;
 }
 

@@ -12,10 +12,14 @@ struct Form {
   OccupancyKind kind = OccupancyKind::binary;  ///< bits 0, 1
   Cell root = Cell::inner;                     ///< bits 2, 3
   bool exceptions = false;                     ///< bit 4
+  /// Bit 5, of every tree with log-odds. Without it they are in mixed bits, which only the first archives
+  /// had.
+  static constexpr unsigned kSymbols = 32;
 
   [[nodiscard]] std::uint8_t byte() const {
     return static_cast<std::uint8_t>(static_cast<unsigned>(kind) | static_cast<unsigned>(root) << 2 |
-                                     (exceptions ? 16u : 0u));
+                                     (exceptions ? 16u : 0u) |
+                                     (kind == OccupancyKind::binary ? 0u : kSymbols));
   }
   [[nodiscard]] static Form from(std::uint8_t b) {
     return {static_cast<OccupancyKind>(b & 3), static_cast<Cell>(b >> 2 & 3), (b & 16) != 0};

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The adaptive state of an occupancy stream and its contexts (FORMAT.md 12). One template for both
-// directions, so that encoder and decoder cannot disagree. `Side` has
+// The structure of binary trees, by mixed bits (FORMAT.md 12.2). One template for both directions, so that
+// encoder and decoder cannot disagree. `Side` has
 //   bool bit(bool known, std::uint32_t p1)      codes `known` and returns it, or ignores it and decodes
-//   std::uint64_t raw(std::uint64_t known, int count)
 #pragma once
 
 #include <algorithm>
@@ -44,7 +43,7 @@ class StructureModel {
   template <class Side>
   std::uint16_t code(Side& shared, const Layer& layer, std::size_t i, unsigned height, std::uint32_t known) {
     Side side = shared;  // in registers
-    const Outside out = look_around(layer, layer.beside[i]);
+    const Outside out = look_around(layer, i);
     const std::uint32_t size = std::min(height, 4u) - 1;
     std::uint32_t node = 0;
     for (unsigned c = 0; c < 8; ++c) {
@@ -61,29 +60,12 @@ class StructureModel {
  private:
   static constexpr unsigned kMostBits = 16;
 
-  /// For each child (two bits at 2 c) the cell beyond the node's border along an axis, or along two.
-  struct Outside {
-    std::uint32_t x, y, z, xy, xz, yz;
-  };
   struct Keys {
     std::uint32_t siblings, faces, around;
   };
   struct Rows {
     BitModel *a, *b, *c;
   };
-
-  static Outside look_around(const Layer& layer, const Beside& beside) {
-    std::array<std::uint32_t, kBeside> w{};
-    for (std::size_t k = 0; k < kBeside; ++k) w[k] = layer.nodes[beside.index[k]];
-    Outside o{};
-    o.x = (w[0] >> 2 & 0x3333) | (w[1] << 2 & 0xCCCC);
-    o.y = (w[2] >> 4 & 0x0F0F) | (w[3] << 4 & 0xF0F0);
-    o.z = (w[4] >> 8 & 0x00FF) | (w[5] << 8 & 0xFF00);
-    o.xy = (w[6] >> 6 & 0x0303) | (w[7] >> 2 & 0x0C0C) | (w[8] << 2 & 0x3030) | (w[9] << 6 & 0xC0C0);
-    o.xz = (w[10] >> 10 & 0x0033) | (w[11] >> 6 & 0x00CC) | (w[12] << 6 & 0x3300) | (w[13] << 10 & 0xCC00);
-    o.yz = (w[14] >> 12 & 0x000F) | (w[15] >> 4 & 0x00F0) | (w[16] << 4 & 0x0F00) | (w[17] << 12 & 0xF000);
-    return o;
-  }
 
   // A sibling that is not coded yet looks like an inner node (3), as neighbours do.
   static Keys keys_of(const Outside& o, std::uint32_t node, unsigned c, std::uint32_t size) {

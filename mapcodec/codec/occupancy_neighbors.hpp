@@ -145,4 +145,22 @@ struct Layer {
   }
 };
 
+/// For each child (two bits at 2 c) the cell beyond its node's border along an axis, or along two.
+struct Outside {
+  std::uint32_t x, y, z, xy, xz, yz;
+};
+/// @param i  node of the layer, from 0.
+[[nodiscard]] inline Outside look_around(const Layer& layer, std::size_t i) {
+  std::array<std::uint32_t, kBeside> w{};
+  for (std::size_t k = 0; k < kBeside; ++k) w[k] = layer.nodes[layer.beside[i].index[k]];
+  Outside o{};
+  o.x = (w[0] >> 2 & 0x3333) | (w[1] << 2 & 0xCCCC);
+  o.y = (w[2] >> 4 & 0x0F0F) | (w[3] << 4 & 0xF0F0);
+  o.z = (w[4] >> 8 & 0x00FF) | (w[5] << 8 & 0xFF00);
+  o.xy = (w[6] >> 6 & 0x0303) | (w[7] >> 2 & 0x0C0C) | (w[8] << 2 & 0x3030) | (w[9] << 6 & 0xC0C0);
+  o.xz = (w[10] >> 10 & 0x0033) | (w[11] >> 6 & 0x00CC) | (w[12] << 6 & 0x3300) | (w[13] << 10 & 0xCC00);
+  o.yz = (w[14] >> 12 & 0x000F) | (w[15] >> 4 & 0x00F0) | (w[16] << 4 & 0x0F00) | (w[17] << 12 & 0xF000);
+  return o;
+}
+
 }  // namespace mapcodec::occupancy

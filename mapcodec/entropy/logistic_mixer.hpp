@@ -106,7 +106,8 @@ class LogisticMixer {
 /// Codes a bit with the mixture of three contexts and teaches all.
 /// @param side   writes `known`, or reads the bit (then `known` is not looked at).
 template <class Side>
-bool code_mixed(Side& side, bool known, BitModel& a, BitModel& b, BitModel& c, LogisticMixer& mixer) {
+[[gnu::always_inline]] inline bool code_mixed(Side& side, bool known, BitModel& a, BitModel& b, BitModel& c,
+                                              LogisticMixer& mixer) {
   const LogisticMixer::Mixed mixed = mixer.predict(a, b, c);
   const bool bit = side.bit(known, mixed.probability);
   mixer.update(mixed, bit);

@@ -158,3 +158,74 @@ class Mixer:
         for m in models:
             m.update(bit)
         return bit
+
+
+# --- 4.6 Symbol code ----------------------------------------------------------------------------------------------
+
+class SymbolDecoder:
+    def __init__(self, data):
+        if len(data) % 2:
+            raise Damaged("a symbol code of half words")
+        self.words = [data[i] | data[i + 1] << 8 for i in range(0, len(data), 2)]
+        self.at = 0
+        self.state = self.word() << 16 | self.word()
+
+    def word(self):
+        self.at += 1
+        if self.at > len(self.words):
+            raise Damaged("a symbol code ends too early")
+        return self.words[self.at - 1]
+
+    def refill(self):
+        if self.state < 1 << 16:
+            self.state = self.state << 16 | self.word()
+
+    def part(self, bounds):
+        """bounds: where each part starts, and 32768."""
+        slot = self.state & 32767
+        s = max(i for i, b in enumerate(bounds) if b <= slot)
+        self.state = (bounds[s + 1] - bounds[s]) * (self.state >> 15) + slot - bounds[s]
+        self.refill()
+        return s
+
+    def bit(self, model):
+        b = 1 - self.part([0, model.p() >> 1, 32768])
+        model.update(b)
+        return b
+
+    def raw(self, count):
+        v = self.state & (1 << count) - 1
+        self.state >>= count
+        self.refill()
+        return v
+
+    def symbol(self, *models):
+        """In one model, or in two."""
+        bounds = [(a + b + 1) >> 1 for a, b in zip(models[0].bounds, models[-1].bounds)]
+        s = self.part(bounds)
+        for m in models:
+            m.update(s)
+        return s
+
+    def end(self):
+        if self.at != len(self.words) or self.state != 1 << 16:
+            raise Damaged("a symbol code that ends where it should not")
+
+
+# --- 4.7 Nibble model ---------------------------------------------------------------------------------------------
+
+class NibbleModel:
+    def __init__(self, weights=None):
+        self.n = 0
+        self.bounds = [2048 * i for i in range(17)]
+        if weights:
+            weights = weights[:15] + [sum(weights[15:])] if len(weights) > 15 else weights
+            self.n, total = 2, sum(weights)
+            self.bounds = [i + sum(weights[:i]) * 32752 // total for i in range(16)] + [32768]
+
+    def update(self, s):
+        step = min(655360 // (10 * self.n + 16), 32767)
+        for i in range(16):
+            target = 16 * i if i <= s else 32768 - 16 * (16 - i)
+            self.bounds[i] += ((target - self.bounds[i]) * step) >> 16
+        self.n = min(self.n + 1, 126)

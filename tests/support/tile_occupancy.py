@@ -3,17 +3,17 @@
 import struct
 
 from read_archive import Damaged, Reader
-from tile_entropy import BitModel, Mixer, Models, RangeDecoder, clamp
+from tile_entropy import BitModel, Mixer, Models, NibbleModel, RangeDecoder, SymbolDecoder, clamp
 
 M32 = (1 << 32) - 1
-OFFSETS = [(-1, 0, 0), (1, 0, 0), (0, -1, 0), (0, 1, 0), (0, 0, -1), (0, 0, 1),
-           (-1, -1, 0), (1, -1, 0), (-1, 1, 0), (1, 1, 0), (-1, 0, -1), (1, 0, -1), (-1, 0, 1), (1, 0, 1),
-           (0, -1, -1), (0, 1, -1), (0, -1, 1), (0, 1, 1)]
+BEFORE = [(-1, 0, 0), (0, -1, 0), (0, 0, -1), (-1, -1, 0), (-1, 0, -1), (0, -1, -1),
+          (1, -1, 0), (1, 0, -1), (0, 1, -1), (-1, 1, 0), (-1, 0, 1), (0, -1, 1)]
 NO_COLOR = (255, 255, 255)
 
 
-def join(a, b):
-    return (((a * 0x85EBCA6B) & M32 ^ b) * 0xC2B2AE35 + 0x27D4EB2F) & M32
+def is_occupied(bits):
+    """NaN is, and so is -0."""
+    return int(not struct.unpack("<f", struct.pack("<I", bits))[0] < 0)
 
 
 class Rows:
@@ -54,22 +54,47 @@ class TreeReader:
         form, self.height = r.uint(1), r.uint(1)
         self.key = [r.varint() for _ in range(3)]
         self.inner, self.leaves = r.varint(), leaves
-        self.kind, self.root, self.exceptions = form & 3, form >> 2 & 3, form >> 4
-        self.table, self.escapes = [], 0
-        if self.kind > 1:
-            head, t = r.varint(), -1
-            self.escapes = head & 1
-            for _ in range(head >> 1):
-                t += r.varint() + 1
-                self.table.append(t & 0x7FFFFFFF if t >> 31 else ~t & M32)
-        self.d = RangeDecoder(r.raw(r.left()))
+        self.kind, self.root, self.exceptions = form & 3, form >> 2 & 3, form >> 4 & 1
+        self.valued = self.kind > 1
+        if form >> 5 != self.valued:
+            raise Damaged("an octree in another form")
+        self.ranked = [[], []]  # class: (bit length, value) by rank; value None: the escape
+        if self.valued:
+            self.read_table(r)
+        data = r.raw(r.left())
+        self.d = SymbolDecoder(data) if self.valued else RangeDecoder(data)
         self.structure = Tables(2 * self.inner, 16)
-        self.values, self.colors = Tables(2 * leaves, 18), Tables(2 * leaves, 16)
-        self.has_color = [BitModel() for _ in range(6)]
-        self.last = 0
+        self.near, self.rows = Models(NibbleModel), Models(NibbleModel)
+        self.row_bits = clamp(self.inner.bit_length(), 6, 13)
+        self.values = [Models(lambda o=o: NibbleModel([1 << w - 1 for w, _ in self.ranked[o]])) for o in range(2)]
+        self.tails, self.has_color, self.last = Models(NibbleModel), Models(), [0, 0]
+        self.colors = Models(NibbleModel)
         self.found = {}  # (height, place) of leaves: cell, value, colour
 
+    def read_table(self, r):
+        head, t, table = r.varint(), -1, []
+        for _ in range(head >> 1):
+            t += r.varint() + 1
+            table.append((r.uint(1), t & 0x7FFFFFFF if t >> 31 else ~t & M32))
+        for weight, value in table:
+            self.ranked[is_occupied(value)].append((weight, value))
+        escapes = r.uint(1) if head & 1 else 0
+        for o in range(2):
+            self.ranked[o].sort(key=lambda e: -e[0])
+            self.ranked[o] += [(escapes, None)] * (head & 1)
+
     def read(self):
+        found = self.read_tree()
+        if self.valued:
+            self.end()
+        return found
+
+    def end(self):
+        """12.6 is not read: what inner nodes hold is no part of a cloud."""
+        if not self.exceptions:
+            self.d.end()
+
+    def read_tree(self):
         if self.root != 3:
             self.read_leaves({(0, 0, 0): self.root}, {}, self.height + 1)
             return self.found
@@ -77,7 +102,7 @@ class TreeReader:
         for h in range(self.height, 0, -1):
             nodes = dict.fromkeys(level)
             for place in level:
-                nodes[place] = self.read_node(nodes, larger, h, place)
+                nodes[place] = (self.read_pairs if self.valued else self.read_node)(nodes, larger, h, place)
             self.read_leaves(nodes, larger, h)
             below = []
             for place in level:
@@ -127,74 +152,96 @@ class TreeReader:
             raise Damaged("an inner node without children")
         return own
 
-    # 12.3, 12.4
+    # 12.3
+    def read_pairs(self, nodes, larger, h, place):
+        own = []
+        for p in range(4):
+            def pair(axis):
+                v = 0
+                for c in (2 * p, 2 * p + 1):
+                    at = list(self.child(place, c))
+                    at[axis] += 2 * (c >> axis & 1) - 1
+                    v |= cell_at(nodes, larger, h, tuple(at)) << 2 * (c & 1)
+                return v
+            x, y, z, v, w = pair(0), pair(1), pair(2), 0, 0
+            if p & 1:
+                y, v = own[p ^ 1], y
+            if p & 2:
+                z, w = own[p ^ 2], z
+            q = 4 * (min(h, 3) - 1) + p
+            key = x + 16 * y + (z << 8) + (v << 12) + (w << 16) + (q << 20)
+            row = (key * 0x9E3779B1 & M32) >> (32 - self.row_bits)
+            own.append(self.d.symbol(self.near[q, z, y], self.rows[row]))
+        node = sum(s << 4 * p for p, s in enumerate(own))
+        if node == 0:
+            raise Damaged("an inner node without children")
+        return node
+
+    # 12.4, 12.5
     def read_leaves(self, nodes, larger, h):
-        symbols, colors = {}, {}
+        ranks, colors = {}, {}
         for place, node in nodes.items():
             for c in range(8):
                 cell, at = node >> 2 * c & 3, self.child(place, c)
                 if cell in (0, 3):
                     continue
                 value = color = None
-                if self.kind > 1:
-                    around = [tuple(a + b for a, b in zip(at, o)) for o in OFFSETS]
-                    cells = [cell_at(nodes, larger, h, p) for p in around]
-                    value = self.read_value(symbols, around, cells, at, cell == 2, min(h - 1, 3))
+                if self.valued:
+                    before = [tuple(a + b for a, b in zip(at, o)) for o in BEFORE]
+                    o = int(cell == 2)
+                    rank, value = self.read_value(ranks, before, o, h > 1)
+                    ranks[at] = o, rank
                     if self.kind == 3:
-                        color = colors[at] = self.read_color(colors, around, cell == 2)
+                        color = colors[at] = self.read_color(colors, before, o, rank)
                 self.found[h - 1, at] = cell, value, color
 
-    def read_value(self, symbols, around, cells, at, occupied, s):
-        v = [3 + symbols[p] if p in symbols else c % 3 for p, c in zip(around, cells)]
-        seen = [symbols[p] for p in around if p in symbols]
-        mean = (2 * sum(seen) + len(seen)) // (2 * len(seen)) + 1 if seen else 0
-        keys = [join(join(v[0], v[2]), v[4]), join(8 * cells[:6].count(1) + cells[:6].count(2), 2 * self.last + 1),
-                join(join(v[6], v[10]), join(v[14], mean))]
-        count = len(self.table) + self.escapes
-        node, bits = 1, (count - 1).bit_length()
-        for _ in range(bits):
-            b = join(2 * node + occupied, s)
-            mixer = min(node, 31) * 4 + occupied * 2 + (s > 0)
-            node = 2 * node + self.values.mixed(self.d, [join(b, k) for k in keys], mixer)
-        self.last = symbols[at] = node - (1 << bits)
-        if self.escapes and self.last == len(self.table):
-            return self.d.raw(32)
-        return self.table[self.last]
+    def read_value(self, ranks, before, o, large):
+        table, rank = self.ranked[o], 0
+        if len(table) > 1:
+            near = [1 + min(ranks[p][1], 15) for p in before if p in ranks and ranks[p][0] == o] + [0, 0]
+            rank = self.d.symbol(self.values[o][large, near[0], near[1]])
+            if rank == 15 and len(table) > 16:
+                v = 0
+                for digit in reversed(range(((len(table) - 16).bit_length() + 3) // 4)):
+                    v = 16 * v + self.d.symbol(self.tails[o, digit, v & 15])
+                rank += v
+        if rank >= len(table):
+            raise Damaged("an unknown log-odds")
+        value = table[rank][1]
+        if value is None:
+            value = self.d.raw(16) << 16
+            value |= self.d.raw(16)
+        return rank, value
 
-    def read_color(self, colors, around, occupied):
-        near = [(colors[p], 8 if o < 6 else 5) for o, p in enumerate(around) if colors.get(p, NO_COLOR) != NO_COLOR]
-        n = len(near)
-        if not self.d.bit(self.has_color[3 * occupied + min(n, 2)]):
+    def read_color(self, colors, before, o, rank):
+        self.last[o] = self.d.bit(self.has_color[o, min(rank, 31), self.last[o]])
+        if not self.last[o]:
             return NO_COLOR
-        guess, spread = [128] * 3, [40] * 3
+        near = [(colors[p], 8 if i < 3 else 5) for i, p in enumerate(before) if colors.get(p, NO_COLOR) != NO_COLOR]
+        n, guess, spread = len(near), [128] * 3, 40
         if n:
             w = sum(weight for _, weight in near)
             guess = [(2 * sum(k * color[i] for color, k in near) + w) // (2 * w) for i in range(3)]
-            spread = [sum(abs(color[i] - guess[i]) for color, _ in near) // n for i in range(3)]
+            spread = sum(abs(color[1] - guess[1]) for color, _ in near) // n
+        spread = spread if spread <= 8 else 9 if spread < 16 else 10 if spread < 32 else 11
         result, d = [0] * 3, [0, 0]
         for q, i in enumerate((1, 0, 2)):
             shift = (0, d[0], int((d[0] + d[1]) / 2))[q]
             p = clamp(guess[i] + shift, 0, 255)
-            step = spread[i] if spread[i] <= 8 else 9 if spread[i] < 16 else 10 if spread[i] < 32 else 11
             first, second = (abs(v).bit_length() for v in d)
-            contexts = [8 * step + min(n, 7), 256 * step + 16 * first + second, min(sum(spread), 127) // 2]
-            result[i] = p + self.read_difference(q, contexts)
+            context = ((0, spread, min(n, 7)), (1, first), (2, first, second))[q]
+            result[i] = p + self.read_difference(self.colors[context])
             d[0 if q == 0 else 1] = result[i] - guess[i]
         return tuple(result)
 
-    def read_difference(self, q, contexts):
-        def ask(t):
-            b = 4 * t + q
-            return self.colors.mixed(self.d, [join(b, c) for c in contexts], min(t, 17) * 3 + q)
-        k = 0
-        while k < 8 and ask(k):
-            k += 1
-        if k == 0:
+    def read_difference(self, model):
+        c = self.d.symbol(model)
+        if c == 0:
             return 0
-        negative, v = ask(8 + k), 1
-        for _ in range(k - 1):
-            v = 2 * v + ask(256 * k + v + 256)
-        return -v if negative else v
+        k = 0 if c < 4 else c // 2 - 1
+        rest = self.d.raw(k + 1)
+        v = (c if c < 4 else (2 + c % 2) << k) + (rest >> 1)
+        return -v if rest & 1 else v
 
 
 def read_occupancy(section, count, schema):
