@@ -74,7 +74,8 @@ Result<ValueTable> read_table(ByteReader& in, std::uint64_t leaves) {
 std::uint64_t memory_for(const StreamHead& head, OccupancyKind kind) {
   const std::uint64_t leaf =
       kind == OccupancyKind::binary ? 0 : 4 + 4 + (kind == OccupancyKind::color ? 3 : 0);
-  return head.inner * (2 * (sizeof(Beside) + 10) + 2 + leaf) + head.leaves * leaf;
+  const std::uint64_t board = kind == OccupancyKind::binary ? 0 : 8 + (kind == OccupancyKind::color ? 32 : 0);
+  return head.inner * (2 * (sizeof(Beside) + 10) + 2 + leaf + board) + head.leaves * leaf;
 }
 
 Status check_form(const Form& form, const StreamHead& head, std::uint8_t height, const DecodeLimits& limits,

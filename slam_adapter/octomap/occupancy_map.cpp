@@ -53,6 +53,7 @@ Result<OccupancyMap> OccupancyMap::open(const std::string& path, std::optional<s
   const auto layer = octree_layer(file.archive().info());
   if (!layer.ok()) return damaged(layer.error());
   if (!*layer) return make_error(ErrorCode::kUnsupported, "holds no octree");
+  MAPCODEC_TRY(check_octree_pose(file.archive().info()));
   return OccupancyMap(std::move(file), *(*layer)->schema.occupancy, (*layer)->schema.tile_size_m,
                       (*layer)->submap);
 }

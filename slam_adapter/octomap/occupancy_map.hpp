@@ -36,7 +36,8 @@ struct OccupancyWrite {
 /// The octree of an opened archive, at one revision. Const methods may be called from many threads.
 class OccupancyMap {
  public:
-  /// Errors: those of MapFile::open; Unsupported (the archive holds no octree).
+  /// Errors: those of MapFile::open; Unsupported (the archive holds no octree, or one that was
+  /// moved by a pose).
   [[nodiscard]] static Result<OccupancyMap> open(const std::string& path,
                                                  std::optional<std::uint64_t> revision = std::nullopt);
 

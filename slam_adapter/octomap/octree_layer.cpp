@@ -12,6 +12,18 @@ namespace {
 // Keys times the ratio plus the offset are exact in double when both lie on this grid.
 constexpr double kGrid = 0x1p20;
 
+Status check_still(const std::string& name, const Vec3& translation_m,
+                   const std::array<double, 4>& rotation_xyzw) {
+  const auto& [x, y, z, w] = rotation_xyzw;
+  if (translation_m == Vec3{0, 0, 0} && x == 0 && y == 0 && z == 0 && w != 0) return {};
+  return make_error(
+      ErrorCode::kUnsupported,
+      "submap '" + name +
+          "' holds an octree, which lies on its own grid and cannot be moved: leave its pose at "
+          "0,0,0,0,0,0,1, and after a correction make a new octree of the points (decompress "
+          "--as bt, then update)");
+}
+
 }  // namespace
 
 std::optional<std::uint32_t> octree_submap(const MapInfo& info) {
@@ -33,6 +45,22 @@ Result<std::optional<OctreeLayer>> octree_layer(const MapInfo& info) {
   if (!occupancy_kind(layer.schema))
     return make_error(ErrorCode::kMalformed, "the schema of the map's octree is none");
   return std::optional<OctreeLayer>(std::move(layer));
+}
+
+Status check_octree_pose(const MapInfo& info) {
+  const auto submap = octree_submap(info);
+  if (!submap || *submap >= info.submaps.size()) return {};
+  const Submap& s = info.submaps[*submap];
+  return check_still(s.name, s.translation_m, s.rotation_xyzw);
+}
+
+Status check_octree_pose(const MapInfo& info, std::span<const PoseChange> changes) {
+  const auto submap = octree_submap(info);
+  for (const PoseChange& c : changes) {
+    if (submap && c.submap == *submap && c.submap < info.submaps.size())
+      MAPCODEC_TRY(check_still(info.submaps[c.submap].name, c.translation_m, c.rotation_xyzw));
+  }
+  return {};
 }
 
 Bytes write_octree_layer(const OctreeLayer& layer) {

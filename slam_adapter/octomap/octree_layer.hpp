@@ -3,9 +3,11 @@
 #pragma once
 
 #include <optional>
+#include <span>
 
 #include "mapcodec/cloud/map_schema.hpp"
 #include "maps/map_types.hpp"
+#include "maps/submap_pose.hpp"
 
 namespace mapcodec {
 
@@ -22,6 +24,12 @@ struct OctreeLayer {
 /// Errors: Malformed.
 [[nodiscard]] Result<std::optional<OctreeLayer>> octree_layer(const MapInfo& info);
 [[nodiscard]] Bytes write_octree_layer(const OctreeLayer& layer);
+
+/// An octree lies on its own grid, so it cannot follow a pose: turned or moved cells would have to be made
+/// anew. Errors: Unsupported (the submap that holds the octree is not at the identity).
+[[nodiscard]] Status check_octree_pose(const MapInfo& info);
+/// Whether poses may be set so; back to the identity always.
+[[nodiscard]] Status check_octree_pose(const MapInfo& info, std::span<const PoseChange> changes);
 
 /// Between the keys of an octree's subtrees and those of the tiles that hold them. In an archive of octrees
 /// alone they are the same. Else a subtree takes the cell of the map's grid where its centre lies, of the

@@ -110,6 +110,36 @@ class Octrees(ProgramTest):
         self.compress(with_rays, name="again.mapc")
         self.fails(USAGE, "decompress", archive, "-o", self.path("x.pcd"), "--as", "bt")
 
+    def test_rays_begin_at_corrected_poses(self):
+        scans = [write(self.path(n), pcd_bytes(room(3000, RGB))) for n in ("a.pcd", "b.pcd")]
+        wrong, right = ("2,0,0,0,0,0,1", "5,1,0.5,0,0,0.6,0.8"), ("2,0.3,0,0,0,0,1", "4,1,0,0,0,0.8,0.6")
+
+        def map_of(name, poses):
+            archive = self.path(name)
+            for i, (scan, pose) in enumerate(zip(scans, poses)):
+                self.succeeds("update", archive, scan, "--create", "--max-error", 0.01, "--submap", f"s{i}", "--pose", pose)
+            return archive
+
+        def cells(archive, name):
+            return self.decompress(archive, "--as", "bt", "--resolution", 0.2, name=name).read_bytes()
+
+        moved = map_of("moved.mapc", wrong)
+        before = cells(moved, "before.bt")
+        for i, pose in enumerate(right):
+            self.succeeds("pose", moved, "--submap", f"s{i}", "--pose", pose)
+        after = cells(moved, "after.bt")
+        self.assertNotEqual(before, after)
+        self.assertEqual(after, cells(map_of("straight.mapc", right), "straight.bt"))
+
+    def test_an_octree_cannot_be_moved(self):
+        archive = self.compress(write(self.path("in.pcd"), pcd_bytes(room(2000, RGB))))
+        octree = write(self.path("a.bt"), small_bt())
+        self.succeeds("update", archive, octree)
+        for pose in ("1,0,0,0,0,0,1", "0,0,0,0,0,1,0"):
+            self.fails(BAD_INPUT, "pose", archive, "--submap", "octree", "--pose", pose, says="--as bt")
+        self.succeeds("pose", archive, "--submap", "octree", "--pose", "0,0,0,0,0,0,1")
+        self.assertEqual(self.decompress(archive, name="out.bt").read_bytes(), octree.read_bytes())
+
     def test_bad_files(self):
         good = small_bt()
         for name, data in {"cut.bt": good[:-3], "count.bt": good.replace(b"size ", b"size 9"), "empty.bt": b"",

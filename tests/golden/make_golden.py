@@ -10,6 +10,7 @@ after a deliberate change of the format; from 1.0 on files are only added, never
 """
 import argparse
 import json
+import math
 import pathlib
 import random
 import struct
@@ -152,6 +153,64 @@ def survey():
 
 
 # name: (name of the input, its maker, flags)
+def cells_of_a_hill(r):
+    """Voxels of a hill and the free air above: place -> log-odds and colour. More than sixteen values are occupied ones."""
+    cells = {}
+    for x in range(30):
+        for y in range(22):
+            top = int(8 + 3 * math.sin(x / 4) + 2 * math.cos(y / 3))
+            shade = 90 + 4 * x + r.randrange(9)
+            cells[x, y, top] = 0.85 * min(20, 1 + int(r.expovariate(0.4))), (shade, shade - 40 + r.randrange(4), 5 * y)
+            for z in range(top + 1, top + 5):
+                cells[x, y, z] = -0.4 * (5 if z > top + 2 else 1 + r.randrange(3)), (255, 255, 255)
+    return {tuple(32768 - 9 + v for v in place): cell for place, cell in cells.items()}
+
+
+def tree_of(cells, height):
+    """(log-odds, colour, children or None): a leaf where eight alike meet, else what OctoMap makes of the children."""
+    if height == 0:
+        (value, rgb), = cells.values()
+        return value, rgb, None
+    parts = [{} for _ in range(8)]
+    for place, cell in cells.items():
+        parts[sum((v >> (height - 1) & 1) << d for d, v in enumerate(place))][place] = cell
+    children = [tree_of(p, height - 1) if p else None for p in parts]
+    if all(c and c[2] is None and c == children[0] for c in children):
+        return children[0]
+    there = [c for c in children if c]
+    shown = [c[1] for c in there if c[1] != (255, 255, 255)]
+    mean = tuple(sum(c[d] for c in shown) // len(shown) for d in range(3)) if shown else (255, 255, 255)
+    return max(c[0] for c in there), mean, children
+
+
+def octree(kind, odd_root=False):
+    """A file of OctoMap's. kind: "bt", "OcTree" or "ColorOcTree"; odd_root: an inner node that is not what its children say."""
+    value, rgb, children = tree_of(cells_of_a_hill(random.Random(8)), 16)
+    nodes, body = 0, bytearray()
+
+    def ot(node):
+        nonlocal nodes
+        nodes += 1
+        body.extend(struct.pack("<f", node[0]) + (bytes(node[1]) if kind == "ColorOcTree" else b""))
+        body.append(sum(1 << i for i, c in enumerate(node[2] or []) if c))
+        for c in node[2] or []:
+            if c:
+                ot(c)
+
+    def bt(node):
+        nonlocal nodes
+        nodes += 1 + sum(1 for c in node[2] if c and c[2] is None)
+        body.extend(struct.pack("<H", sum((3 if c[2] else 1 if c[0] < 0 else 2) << 2 * i for i, c in enumerate(node[2]) if c)))
+        for c in node[2]:
+            if c and c[2]:
+                bt(c)
+
+    (bt if kind == "bt" else ot)((value + (1 if odd_root else 0), rgb, children))
+    what, name = ("binary ", "OcTree") if kind == "bt" else ("", kind)
+    return (f"# Octomap OcTree {what}file\n# (feel free to add / change comments, but leave the first line as it is!)\n#\n"
+            f"id {name}\nsize {nodes}\nres 0.1\ndata\n").encode() + bytes(body)
+
+
 CLOUDS = {
     "points_fast": ("a.pcd", colored_room, "--max-error 0.005 --effort fast"),
     "points_default": ("a.pcd", colored_room, "--max-error 0.005"),
@@ -181,6 +240,10 @@ CLOUDS = {
     "lossless_utm": ("a.pcd", utm_decimals, "--lossless"),
     "lossless_utm_floats": ("a.pcd", utm_room, "--lossless --effort fast"),
     "lossless_survey": ("a.las", survey, "--lossless"),
+    "octree_binary": ("a.bt", lambda: octree("bt"), ""),
+    "octree_log_odds": ("a.ot", lambda: octree("OcTree"), ""),
+    "octree_colors": ("a.ot", lambda: octree("ColorOcTree"), ""),
+    "octree_odd_root": ("a.ot", lambda: octree("ColorOcTree", odd_root=True), ""),
 }
 
 

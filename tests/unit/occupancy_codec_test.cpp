@@ -209,6 +209,24 @@ TEST(OccupancyDamage, LiesAboutCountsAreRefusedBeforeMemoryIsTaken) {
   EXPECT_EQ(decode_occupancy_tile(fine, small).error().code, ErrorCode::kLimitExceeded);
 }
 
+TEST(OccupancyDamage, TheFormBeforeSymbolsIsRefused) {
+  for (const OccupancyKind kind : {OccupancyKind::log_odds, OccupancyKind::color}) {
+    Bytes bytes = encode_occupancy_tile(whole(one_leaf(kind, Cell::occupied)), 0.1).bytes;
+    bytes[3] ^= 32;  // after codec, flags and the number of points
+    const auto refused = decode_occupancy_tile(bytes);
+    ASSERT_FALSE(refused.ok());
+    EXPECT_EQ(refused.error().code, ErrorCode::kUnsupported);
+  }
+}
+
+TEST(OccupancyDamage, CodesThatGoOnAreRefused) {
+  for (const OccupancyKind kind : {OccupancyKind::log_odds, OccupancyKind::color}) {
+    Bytes bytes = encode_occupancy_tile(whole(bubble(kind, 5)), 0.1).bytes;
+    bytes.insert(bytes.end(), {0, 0});
+    EXPECT_FALSE(decode_occupancy_tile(bytes).ok());
+  }
+}
+
 TEST(OccupancyDamage, PiecesThatOverlapAreRefused) {
   std::vector<OccupancyExtra> extras;
   auto pieces = cut_tree(bubble(OccupancyKind::binary, 20), 100, extras);

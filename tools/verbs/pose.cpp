@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "maps/map_writer.hpp"
+#include "slam_adapter/octomap/octree_layer.hpp"
 #include "tools/verbs/change.hpp"
 #include "tools/verbs/history.hpp"
 #include "tools/verbs/remote.hpp"
@@ -62,6 +63,7 @@ Result<NamedPoses> asked(const Arguments& a) {
 Result<std::uint64_t> change(const Arguments& a, const NamedPoses& named) {
   MAPCODEC_ASSIGN(MapWriter writer, MapWriter::open(a.map));
   MAPCODEC_ASSIGN(const std::vector<PoseChange> changes, numbered(writer.info(), named));
+  MAPCODEC_TRY(check_octree_pose(writer.info(), changes));
   MAPCODEC_TRY(writer.set_poses(changes));
   return writer.commit(commit_time());
 }
