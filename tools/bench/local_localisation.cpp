@@ -189,7 +189,10 @@ class Localisation {
       paths.push_back(std::move(path));
     }
     if (paths.size() > 1) return paths;
-    return scans_of_log(paths.front(), b_.settings.report + "/scans");
+    MAPCODEC_ASSIGN(paths, scans_of_log(paths.front(), b_.settings.report + "/scans"));
+    // One from the middle, which others overlap on both sides.
+    std::swap(paths[paths.size() / 2], paths.back());
+    return paths;
   }
 
   Status read(const Sequence& sequence) {
