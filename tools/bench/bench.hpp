@@ -47,8 +47,9 @@ struct BenchSettings {
 /// formats.md). A file that is refused is a row with its message.
 [[nodiscard]] Status bench_formats(const BenchSettings& settings);
 
-/// Maps built scan after scan beside maps made at once, and points taken in by a large map while it is read
-/// (update.json, update.md). `quick`: a map of 5 instead of 50 million points.
+/// Maps built scan after scan beside maps made at once, tiles that grow until they are split, and points
+/// taken in by a large map while it is read (update.json, update.md). `files` chooses: "growth", "ingest",
+/// and sequences by parts of their names. `quick`: a map of 5 instead of 50 million points.
 [[nodiscard]] Status bench_update(const BenchSettings& settings);
 
 /// Octrees (.bt, .ot) and OctoMap's scan.dat: size beside zstd, time beside OctoMap, leaf by leaf the same,

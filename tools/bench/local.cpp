@@ -237,11 +237,16 @@ std::uint64_t file_bytes(const std::string& path) {
 }
 
 Result<BenchCloud> load_named(const BenchSettings& settings, const std::string& part) {
+  MAPCODEC_ASSIGN(const std::string path, path_named(settings, part));
+  return load_cloud(path);
+}
+
+Result<std::string> path_named(const BenchSettings& settings, const std::string& part) {
   std::error_code failed;
   fs::recursive_directory_iterator it(settings.data, failed);
   if (failed) return make_error(ErrorCode::kNotFound, settings.data + ": " + failed.message());
   for (const fs::directory_entry& entry : it) {
-    if (entry.path().generic_string().ends_with(part)) return load_cloud(entry.path().string());
+    if (entry.path().generic_string().ends_with(part)) return entry.path().string();
   }
   return make_error(ErrorCode::kNotFound, settings.data + " has no " + part);
 }

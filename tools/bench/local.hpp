@@ -24,8 +24,9 @@ struct LocalBench {
 /// Scans that are not in the map, against the raw map's result. Errors: CannotWrite, those of the codec.
 [[nodiscard]] Status bench_localisation(LocalBench& bench);
 
-/// The first readable file below settings.data whose path ends with `part`. Errors: NotFound, those of
-/// reading.
+/// The first file below settings.data whose path ends with `part`. Errors: NotFound.
+[[nodiscard]] Result<std::string> path_named(const BenchSettings& settings, const std::string& part);
+/// Its points. Errors: NotFound, those of reading.
 [[nodiscard]] Result<BenchCloud> load_named(const BenchSettings& settings, const std::string& part);
 [[nodiscard]] double wall_s();
 [[nodiscard]] std::uint64_t file_bytes(const std::string& path);

@@ -11,7 +11,9 @@
 #include "slam_adapter/compress.hpp"
 #include "slam_adapter/formats/byte_stream.hpp"
 #include "slam_adapter/formats/scan_folder.hpp"
+#include "tools/bench/clouds.hpp"
 #include "tools/bench/local.hpp"
+#include "tools/bench/log_scans.hpp"
 #include "tools/examples/registration.hpp"
 
 namespace mapcodec::bench {
@@ -21,14 +23,15 @@ using Eigen::Isometry3d;
 using examples::Partner;
 using examples::Registration;
 
-/// The first scan is the map's frame; those between are put into the map where they fit the first, and the
-/// last is localised. Guesses of T_first_scan: x, y, z [m], yaw [degrees].
+/// The first scan is the map's frame (of a log: the log's is); those between are put into the map where they
+/// fit the first, and the last is localised. Guesses of T_first_scan: x, y, z [m], yaw [degrees].
 struct Sequence {
   const char* name;
   std::vector<const char*> scans;
   std::vector<std::array<double, 4>> guesses;
   double reach_m;
   double range_m = 1e9;  ///< what is farther is no return
+  bool posed = false;    ///< the scans lie where the log says: they go into the map without being registered
 };
 const std::vector<Sequence> kSequences{
     {"3DTK corridor", {"dat/scan000.3d", "dat/scan001.3d", "dat/scan002.3d"}, {}, 1.0, 30},
@@ -38,7 +41,9 @@ const std::vector<Sequence> kSequences{
     {"car (libpointmatcher)",
      {"data/cloud.00000.vtk", "data/cloud.00001.vtk", "data/cloud.00002.vtk"},
      {},
-     2.0}};
+     2.0},
+    {"simplemap (MRPT)", {"hku_mlcc_scene2_L1_12kf.simplemap"}, {}, 1.0, 1e9, true},
+    {"HDL-32 (MRPT)", {"sample_velodyne_hdl32.rawlog"}, {}, 1.0, 1e9, true}};
 
 /// What is varied against the raw map: its coding, or, to know what a difference says, nothing but the guess
 /// or the choice of points.
@@ -71,8 +76,8 @@ struct Outcome {
   std::uint64_t peak = 0, held = 0;
 };
 
-Result<std::vector<Vec3>> finite_points(const BenchSettings& settings, const char* part, double range_m) {
-  MAPCODEC_ASSIGN(BenchCloud cloud, load_named(settings, part));
+Result<std::vector<Vec3>> finite_points(const std::string& path, double range_m) {
+  MAPCODEC_ASSIGN(BenchCloud cloud, load_cloud(path));
   // Some sensors write 0 0 0, others their longest range where nothing came back: a ball around the sensor
   // that goes with it.
   std::erase_if(cloud.cloud.xyz, [&](const Vec3& p) {
@@ -159,6 +164,10 @@ class Localisation {
         last = guess;
         break;
       }
+      if (sequence.posed) {
+        add(scans_[i], guess);
+        continue;
+      }
       MAPCODEC_TRY(write_map(kKinds[0], map_));
       MAPCODEC_ASSIGN(const Outcome o, localise(b_, scans_[i], guess, Method::planes, sequence.reach_m));
       add(scans_[i], o.registration.T_map_scan);
@@ -172,14 +181,27 @@ class Localisation {
   }
 
  private:
+  /// A log is taken apart into its keyframes.
+  Result<std::vector<std::string>> paths_of(const Sequence& sequence) const {
+    std::vector<std::string> paths;
+    for (const char* part : sequence.scans) {
+      MAPCODEC_ASSIGN(std::string path, path_named(b_.settings, part));
+      paths.push_back(std::move(path));
+    }
+    if (paths.size() > 1) return paths;
+    MAPCODEC_ASSIGN(paths, scans_of_log(paths.front(), b_.settings.report + "/scans"));
+    // One from the middle, which others overlap on both sides.
+    std::swap(paths[paths.size() / 2], paths.back());
+    return paths;
+  }
+
   Status read(const Sequence& sequence) {
     scans_.clear();
     paths_.clear();
     map_ = {};
-    for (const char* part : sequence.scans) {
-      MAPCODEC_ASSIGN(const BenchCloud cloud, load_named(b_.settings, part));
-      paths_.push_back(cloud.path);
-      MAPCODEC_ASSIGN(std::vector<Vec3> points, finite_points(b_.settings, part, sequence.range_m));
+    MAPCODEC_ASSIGN(paths_, paths_of(sequence));
+    for (const std::string& path : paths_) {
+      MAPCODEC_ASSIGN(std::vector<Vec3> points, finite_points(path, sequence.range_m));
       scans_.push_back(std::move(points));
     }
     map_.xyz.clear();
@@ -336,6 +358,8 @@ Status bench_localisation(LocalBench& bench) {
     const Status s = run.run(sequence);
     if (!s.ok()) bench.report.note(fmt::format("{}: {}", sequence.name, s.error().message));
   }
+  std::error_code ignored;
+  std::filesystem::remove_all(bench.settings.report + "/scans", ignored);
   return {};
 }
 

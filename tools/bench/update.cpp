@@ -249,9 +249,8 @@ Status bench_update(const BenchSettings& settings) {
   }
   std::error_code ignored;
   std::filesystem::remove_all(scratch, ignored);
-  const bool ingest = settings.files.empty() || std::find(settings.files.begin(), settings.files.end(),
-                                                          "ingest") != settings.files.end();
-  if (ingest) MAPCODEC_TRY(bench::measure_ingest(settings, report));
+  if (is_wanted(settings, "growth")) MAPCODEC_TRY(bench::measure_growth(settings, report));
+  if (is_wanted(settings, "ingest")) MAPCODEC_TRY(bench::measure_ingest(settings, report));
   std::filesystem::remove(report.scratch(), ignored);
   return report.finish();
 }

@@ -142,7 +142,65 @@ void report_ingest(Report& report, const std::string& name, const Ingest& r, dou
                                          {"reader_solo_points_per_second", solo}});
 }
 
+struct Growth {
+  std::uint64_t points = 0, splits = 0, tiles = 0, largest = 0;
+  std::vector<double> usual, splitting;  ///< [s] of commits
+};
+
+/// Scans of one place, every point kept: its tiles grow until they are split.
+Result<Growth> grow(const std::string& path, const PointCloud& scan, const CompressOptions& o, int scans,
+                    Arena& arena) {
+  UpdateSettings update;
+  update.density_cap = false;
+  std::vector<std::string> warnings;
+  CloudSource first(scan);
+  MAPCODEC_ASSIGN(MapUpdater map, create_map(path, first, o, arena, update, warnings));
+  Growth g;
+  for (int i = 0; i < scans; ++i) {
+    PointCloud c = scan_at(scan, 0, unsigned(200000 + i));
+    const Watch watch(Watch::Kind::whole_process);
+    MAPCODEC_TRY(map.insert(std::move(c)));
+    MAPCODEC_ASSIGN(const UpdateReport u, map.commit(0));
+    g.points += u.points_added;
+    g.splits += u.tiles_split;
+    (u.tiles_split > 0 ? g.splitting : g.usual).push_back(watch.seconds());
+  }
+  MAPCODEC_ASSIGN(const MapFile file, MapFile::open(path));
+  g.tiles = file.archive().tiles().size();
+  for (const TileRecord& t : file.archive().tiles()) g.largest = std::max(g.largest, t.points);
+  return g;
+}
+
 }  // namespace
+
+Status measure_growth(const BenchSettings& settings, Report& report) {
+  MAPCODEC_ASSIGN(const PointCloud scan, real_scan(settings));
+  Arena arena(settings.threads);
+  report.line(fmt::format("\n## Scans of {} points into one place, every point kept\n", scan.size()));
+  report.table({"promise", "M points", "tiles", "largest tile, M points", "splits",
+                "commit ms of processor p50", "those that split p50", "most"});
+  for (const PromiseKind promise : {PromiseKind::max_error, PromiseKind::rms}) {
+    settings.say(fmt::format("tiles that grow, {}", promise_name(promise)));
+    CompressOptions o;
+    o.promise = promise;
+    o.promise_m = kPromise;
+    o.overwrite = true;
+    MAPCODEC_ASSIGN(const Growth g, grow(report.scratch(), scan, o, settings.quick ? 30 : 60, arena));
+    report.row({promise_name(promise), digits(double(g.points) / 1e6), std::to_string(g.tiles),
+                digits(double(g.largest) / 1e6), std::to_string(g.splits),
+                digits(1e3 * quantile(g.usual, 0.5)), digits(1e3 * quantile(g.splitting, 0.5)),
+                digits(1e3 * quantile(g.splitting, 1))});
+    report.json()["growth"].push_back(Json{{"promise", promise_name(promise)},
+                                           {"points", g.points},
+                                           {"tiles", g.tiles},
+                                           {"largest_tile", g.largest},
+                                           {"splits", g.splits},
+                                           {"commit_processor_s", quantile(g.usual, 0.5)},
+                                           {"splitting_commit_processor_s", quantile(g.splitting, 0.5)},
+                                           {"slowest_splitting_commit_s", quantile(g.splitting, 1)}});
+  }
+  return {};
+}
 
 Status measure_ingest(const BenchSettings& settings, Report& report) {
   const std::uint64_t size = settings.quick ? 5'000'000 : 50'000'000;
