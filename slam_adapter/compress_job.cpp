@@ -123,6 +123,7 @@ Status CompressJob::make_tiles() {
   survey_.cloud.reset();
   if (!tiles.ok()) return tiles.error();
   tiles_ = std::make_unique<TileSet>(std::move(tiles).value());
+  neighbors_ = std::make_unique<TileNeighbors>(*tiles_, schema_.origin, schema_.tile_size_m);
   levels_ = std::make_unique<LevelSampler>(*tiles_);
   return {};
 }
@@ -356,9 +357,11 @@ Status CompressJob::store_coded() {
 /// the error of the map would leap to the other side of the promise.
 Result<EncodedTile> CompressJob::encode(const PointCloud& tile, const MapSchema& target) const {
   CodingPlan plan = choice_.plan;
+  const auto key = plan_.tile_of(tile.xyz.front());
+  if (!key) return encode_by_plan(tile, target, plan);
+  plan.tiles.borders = neighbors_->borders_of(*key);
   if (plan.choice == CodecChoice::cheapest && report_.codings > 0) {
-    const auto key = plan_.tile_of(tile.xyz.front());
-    const auto known = key ? codecs_.find(*key) : codecs_.end();
+    const auto known = codecs_.find(*key);
     if (known != codecs_.end()) plan.fixed = known->second;
   }
   return encode_by_plan(tile, target, plan);

@@ -123,7 +123,7 @@ class TileChannels {
 Result<SurfaceTile> encode_surface_tile(const PointCloud& tile, const MapSchema& schema, double step_m,
                                         const TileSettings& settings) {
   const Quantizer lattice{schema.origin, step_m, schema.coordinates.kind};
-  MAPCODEC_ASSIGN(SurfaceEncoding e, encode_surface(tile.xyz, lattice, {settings.effort}));
+  MAPCODEC_ASSIGN(SurfaceEncoding e, encode_surface(tile.xyz, lattice, {settings.effort, settings.borders}));
   SurfaceTile r;
   for (const Vec3& p : e.decoded) r.bounds.add(p);
   if (settings.rough_errors && coded_channels(schema, CodecId::surface).empty()) {
