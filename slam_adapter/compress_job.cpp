@@ -125,6 +125,7 @@ Status CompressJob::make_tiles() {
   survey_.cloud.reset();
   if (!tiles.ok()) return tiles.error();
   tiles_ = std::make_unique<TileSet>(std::move(tiles).value());
+  neighbors_ = std::make_unique<TileNeighbors>(*tiles_, schema_.origin, schema_.tile_size_m);
   levels_ = std::make_unique<LevelSampler>(*tiles_);
   return {};
 }
@@ -369,12 +370,13 @@ Status CompressJob::store_coded() {
 Result<EncodedTile> CompressJob::encode(const PointCloud& tile, const MapSchema& target) {
   CodingPlan plan = choice_.plan;
   const auto key = plan_.tile_of(tile.xyz.front());
+  if (!key) return encode_by_plan(tile, target, plan);
+  plan.tiles.borders = neighbors_->borders_of(*key);
   if (plan.choice == CodecChoice::cheapest && report_.codings > 0) {
-    const auto known = key ? codecs_.find(*key) : codecs_.end();
+    const auto known = codecs_.find(*key);
     if (known != codecs_.end()) plan.fixed = known->second;
   }
-  return key && has_color_slope() ? memory_.encode(*key, tile, target, plan)
-                                  : encode_by_plan(tile, target, plan);
+  return has_color_slope() ? memory_.encode(*key, tile, target, plan) : encode_by_plan(tile, target, plan);
 }
 
 Status CompressJob::store(const TileKey& key, EncodedTile&& t) {

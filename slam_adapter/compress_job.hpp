@@ -9,6 +9,7 @@
 #include "maps/map_writer.hpp"
 #include "parallel/arena.hpp"
 #include "parallel/survey.hpp"
+#include "parallel/tile_neighbors.hpp"
 #include "parallel/tile_set.hpp"
 #include "slam_adapter/coding_memory.hpp"
 #include "slam_adapter/compress.hpp"
@@ -66,6 +67,7 @@ class CompressJob {
   TilePlan plan_;
   MapSchema schema_;
   std::unique_ptr<TileSet> tiles_;
+  std::unique_ptr<TileNeighbors> neighbors_;
   std::unique_ptr<LevelSampler> levels_;
   std::unique_ptr<MapWriter> writer_;
   PlanChoice choice_;

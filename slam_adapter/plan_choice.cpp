@@ -201,7 +201,7 @@ Result<PlanChoice> choose_plan(const CompressOptions& options, const TileSet& ti
   TileSample sample;
   // Without a lattice there is nothing to choose.
   if (options.promise == PromiseKind::rms || options.promise == PromiseKind::max_error) {
-    MAPCODEC_ASSIGN(sample, take_sample(tiles, arena));
+    MAPCODEC_ASSIGN(sample, take_sample(tiles, schema, arena));
   }
   return Chooser(options, sample, schema, arena, warnings).choose();
 }

@@ -9,6 +9,7 @@
 #include "mapcodec/quality/nearest.hpp"
 #include "parallel/encode_pipeline.hpp"
 #include "parallel/runner.hpp"
+#include "parallel/tile_neighbors.hpp"
 
 namespace mapcodec {
 namespace {
@@ -94,7 +95,7 @@ std::size_t TileSample::points() const {
 TileSample TileSample::part(std::size_t most) const {
   const std::size_t all = points();
   if (all <= most) return *this;
-  TileSample r{{}, false, side_m, spacing_m};
+  TileSample r{{}, {}, false, side_m, spacing_m};
   // No piece falls below a few thousand points: too small a tile says nothing about a large one.
   constexpr std::size_t kLeastPiece = 4000;
   for (const PointCloud& piece : pieces)
@@ -118,12 +119,14 @@ double mean_spacing(std::vector<Vec3> points) {
   return sum / static_cast<double>(take);
 }
 
-Result<TileSample> take_sample(const TileSet& tiles, Arena& arena) {
+Result<TileSample> take_sample(const TileSet& tiles, const MapSchema& schema, Arena& arena) {
   TileSample sample;
   sample.whole = tiles.points() <= kSamplePoints;
+  const TileNeighbors neighbors(tiles, schema.origin, schema.tile_size_m);
   for (const auto& [tile, points] : picked(tiles, sample.whole)) {
     MAPCODEC_ASSIGN(const PointCloud cloud, tiles.load(tile));
     sample.pieces.push_back(cut(cloud, points));
+    if (sample.whole) sample.borders.push_back(neighbors.borders_of(tiles.tiles()[tile].key));
   }
   measure(sample, arena);
   return sample;
@@ -137,7 +140,9 @@ Result<CodedSum> encode_sample(const TileSample& sample, const MapSchema& schema
   TbbRunner(arena).run(coded.size(), [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       const double since = thread_seconds();
-      coded[i] = encode_by_plan(sample.pieces[i], schema, plan);
+      CodingPlan own = plan;
+      if (i < sample.borders.size()) own.tiles.borders = sample.borders[i];
+      coded[i] = encode_by_plan(sample.pieces[i], schema, own);
       seconds[i] = thread_seconds() - since;
     }
   });

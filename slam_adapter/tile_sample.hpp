@@ -11,10 +11,11 @@
 namespace mapcodec {
 
 struct TileSample {
-  std::vector<PointCloud> pieces;  ///< compact parts of tiles, every point of the part
-  bool whole = false;              ///< pieces are all tiles of the map, uncut
-  double side_m = 0;               ///< longest side of a piece
-  double spacing_m = 0;            ///< mean distance to the nearest other position
+  std::vector<PointCloud> pieces;    ///< compact parts of tiles, every point of the part
+  std::vector<TileBorders> borders;  ///< of the pieces, where they are whole tiles; else empty
+  bool whole = false;                ///< pieces are all tiles of the map, uncut
+  double side_m = 0;                 ///< longest side of a piece
+  double spacing_m = 0;              ///< mean distance to the nearest other position
 
   [[nodiscard]] std::size_t points() const;
   /// Compact parts of the pieces, `points` together or a little more.
@@ -23,7 +24,8 @@ struct TileSample {
 
 /// The whole map if it is small; else sixteen tiles at most, evenly spread, and of large ones a compact part,
 /// so that trying is cheap. The same for any number of threads. Errors: those of TileSet::load.
-[[nodiscard]] Result<TileSample> take_sample(const TileSet& tiles, Arena& arena);
+/// @param schema  of the map: says where tiles lie.
+[[nodiscard]] Result<TileSample> take_sample(const TileSet& tiles, const MapSchema& schema, Arena& arena);
 
 /// A sample as coded.
 struct CodedTiles {

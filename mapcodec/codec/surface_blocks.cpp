@@ -60,7 +60,7 @@ Fit fit_along(const Sums& s, unsigned k) {
 
 /// Area of the plane's piece in its voxel, in any unit.
 std::uint64_t weight_of(const Leaf& leaf) {
-  const Polygon polygon = polygon_of(leaf.plane, leaf.shape);
+  const Polygon polygon = polygon_of(leaf.plane, leaf.shape, Room::whole(leaf.shape));
   if (polygon.size < 3) return 1;
   const std::int64_t half = half_side(leaf.shape[0]);
   const std::int64_t a = (std::int64_t{leaf.plane.a} << 8) / half,
@@ -155,17 +155,17 @@ VoxelSet occupied(const std::vector<Leaf>& leaves, int v, std::span<const SubUni
 }  // namespace
 
 std::vector<SubUnits> spread_leaves(std::vector<Leaf>& leaves, std::span<const Block> blocks, int v,
-                                    std::size_t count) {
+                                    std::size_t count, const Surroundings& around) {
   std::vector<SubUnits> points;
   points.reserve(count);
   std::vector<Vertex> scratch;
   for (const Leaf& l : leaves) {
-    if (l.block < 0) append_points(l, scratch, points);
+    if (l.block < 0) append_points(l, around, scratch, points);
   }
   if (blocks.empty()) return points;
   settle_blocks(leaves, blocks, v, points);
   for (const Leaf& l : leaves) {
-    if (l.block >= 0) append_points(l, scratch, points);
+    if (l.block >= 0) append_points(l, around, scratch, points);
   }
   return points;
 }

@@ -36,6 +36,6 @@ void settle_blocks(std::vector<Leaf>& leaves, std::span<const Block> blocks, int
 
 /// Points of all leaves: first those of the cells, in order, then those of the voxels.
 [[nodiscard]] std::vector<SubUnits> spread_leaves(std::vector<Leaf>& leaves, std::span<const Block> blocks,
-                                                  int v, std::size_t count);
+                                                  int v, std::size_t count, const Surroundings& around);
 
 }  // namespace mapcodec::surface

@@ -17,7 +17,8 @@ using surface::SubUnits;
 // levels, leaves, points in both forms, and what sorting takes.
 constexpr std::uint64_t kCellBytes = 112;
 constexpr std::uint64_t kBytesPerPoint = 2 * kCellBytes + 2 * sizeof(surface::Leaf) + 2 * sizeof(SubUnits) +
-                                         sizeof(Vec3) + sizeof(VoxelCoord) + 2 * sizeof(KeyedIndex);
+                                         sizeof(Vec3) + sizeof(VoxelCoord) + 2 * sizeof(KeyedIndex) +
+                                         surface::kJoinedBytesPerPoint;
 
 Status check_count(std::uint64_t count, const DecodeLimits& limits) {
   if (count == 0) return make_error(ErrorCode::kMalformed, "surface tile without points");
@@ -31,6 +32,7 @@ template <class Side>
 bool read_tree(surface::Walk<Side>& walk, std::uint64_t count, const surface::Header& header,
                unsigned levels) {
   walk.models().count_shift = header.count_shift;
+  walk.models().outline = outline_of(header);
   walk.models().voxel_bits = header.block_bits;
   return walk.run(static_cast<std::uint32_t>(count), header.depth, levels);
 }
@@ -65,7 +67,7 @@ Result<std::vector<SubUnits>> decode_tree(ByteSpan code, std::uint64_t count, co
   std::vector<surface::Block> blocks = walk->blocks();
   surface::Header seen = header;
   seen.block_bits = settle_cut(walk->leaves(), blocks, header, levels);
-  return surface::points_of(walk->leaves(), blocks, count, seen);
+  return surface::points_of(walk->leaves(), blocks, count, seen, walk->joints());
 }
 
 /// Notes how far it has read at the end of each binary level.

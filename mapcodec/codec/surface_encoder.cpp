@@ -33,8 +33,26 @@ Status check(std::span<const Vec3> xyz, const Quantizer& lattice) {
   return {};
 }
 
+/// Says how far the points reach, and at which faces of the tile's cube they go on in the next tile.
+void fit_outline(const std::array<std::uint64_t, 3>& reach, const Box& box, const Quantizer& lattice,
+                 const TileBorders& borders, surface::Header& header) {
+  header.fitted = true;
+  const double near = lattice.step_m / 2;
+  for (unsigned d = 0; d < 3; ++d) {
+    const bool low = borders.goes_on(d, false) && box.min[d] - borders.cube.min[d] < near;
+    const bool high = borders.goes_on(d, true) && borders.cube.max[d] - box.max[d] < near;
+    header.borders |= static_cast<std::uint8_t>((low ? 1u : 0u) << (2 * d) | (high ? 2u : 0u) << (2 * d));
+    // At a border a little less will do: the surface goes beyond it anyway.
+    const std::uint64_t units = reach[d] + 1;
+    const std::uint64_t steps =
+        (units + surface::kStepUnits - (high ? surface::kOverlap * 2 / 3 : 1)) / surface::kStepUnits;
+    header.extent[d] = static_cast<std::uint32_t>(std::clamp<std::uint64_t>(steps, 1, surface::kMostExtent));
+  }
+}
+
 /// The box of the points, whose root cell begins at its lowest unit.
-Result<surface::Header> place_root(std::span<const Vec3> xyz, const Quantizer& lattice, double unit) {
+Result<surface::Header> place_root(std::span<const Vec3> xyz, const Quantizer& lattice, double unit,
+                                   const TileBorders& borders) {
   Box box;
   for (std::size_t i = 0; i < xyz.size(); ++i) {
     if (!is_finite(xyz[i])) {
@@ -44,6 +62,7 @@ Result<surface::Header> place_root(std::span<const Vec3> xyz, const Quantizer& l
   }
   surface::Header header;
   std::uint64_t extent = 0;
+  std::array<std::uint64_t, 3> reach{};
   for (std::size_t d = 0; d < 3; ++d) {
     const double low = std::floor((box.min[d] - lattice.origin[d]) / unit);
     const double high = std::floor((box.max[d] - lattice.origin[d]) / unit);
@@ -51,20 +70,22 @@ Result<surface::Header> place_root(std::span<const Vec3> xyz, const Quantizer& l
       return make_error(ErrorCode::kInvalidArgument, "points too far away for this step");
     }
     header.base[d] = static_cast<std::int64_t>(low);
-    extent = std::max(extent, static_cast<std::uint64_t>(high - low));
+    reach[d] = static_cast<std::uint64_t>(high - low);
+    extent = std::max(extent, reach[d]);
   }
   const int depth = std::bit_width(extent);
   if (depth > surface::kLongestSide) {
     return make_error(ErrorCode::kInvalidArgument, "more than 2^16 surface steps across one tile");
   }
   header.depth = static_cast<std::uint8_t>(depth);
+  fit_outline(reach, box, lattice, borders, header);
   return header;
 }
 
-Result<UnitTile> to_units(std::span<const Vec3> xyz, const Quantizer& lattice) {
+Result<UnitTile> to_units(std::span<const Vec3> xyz, const Quantizer& lattice, const TileBorders& borders) {
   const double unit = lattice.step_m / surface::kStepUnits;
   UnitTile tile;
-  MAPCODEC_ASSIGN(tile.header, place_root(xyz, lattice, unit));
+  MAPCODEC_ASSIGN(tile.header, place_root(xyz, lattice, unit, borders));
   std::vector<KeyedIndex> keys(xyz.size()), scratch;
   for (std::size_t i = 0; i < xyz.size(); ++i) {
     VoxelCoord at;
@@ -100,6 +121,7 @@ std::size_t count_leaves(const std::vector<surface::Choice>& choices) {
 
 void set_up(surface::Models& models, const surface::Header& header) {
   models.count_shift = header.count_shift;
+  models.outline = outline_of(header);
   models.voxel_bits = header.block_bits;
 }
 
@@ -122,7 +144,8 @@ Bytes code_tree(UnitTile& tile, Effort effort, std::vector<surface::SubUnits>& p
       *models = walk->models();
       continue;
     }
-    points = surface::points_of(walk->leaves(), walk->blocks(), tile.points.size(), tile.header);
+    points =
+        surface::points_of(walk->leaves(), walk->blocks(), tile.points.size(), tile.header, walk->joints());
     return side.finish();
   }
 }
@@ -132,7 +155,7 @@ Bytes code_tree(UnitTile& tile, Effort effort, std::vector<surface::SubUnits>& p
 Result<SurfaceEncoding> encode_surface(std::span<const Vec3> xyz, const Quantizer& lattice,
                                        const SurfaceSettings& settings) {
   MAPCODEC_TRY(check(xyz, lattice));
-  MAPCODEC_ASSIGN(UnitTile tile, to_units(xyz, lattice));
+  MAPCODEC_ASSIGN(UnitTile tile, to_units(xyz, lattice, settings.borders));
   SurfaceEncoding e;
   const Bytes code = code_tree(tile, settings.effort, e.points);
   e.header = tile.header;

@@ -7,6 +7,7 @@
 
 #include "mapcodec/base/bytes.hpp"
 #include "mapcodec/base/result.hpp"
+#include "mapcodec/cloud/tile_borders.hpp"
 #include "mapcodec/codec/surface_layout.hpp"
 #include "mapcodec/codec/tile_codec.hpp"
 #include "mapcodec/geometry/quantizer.hpp"
@@ -16,6 +17,7 @@ namespace mapcodec {
 
 struct SurfaceSettings {
   Effort effort = Effort::standard;
+  TileBorders borders;
 };
 
 /// A tile's bytes and what its decoder will make of them.

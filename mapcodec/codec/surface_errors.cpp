@@ -149,12 +149,12 @@ double LeafErrors::of_single(const TreeCell& cell, const Plane* plane) {
   const Units c = cell.twice_center();
   Place at{0.5 * c[0], 0.5 * c[1], 0.5 * c[2]};
   if (plane != nullptr) {
-    const Polygon polygon = polygon_of(*plane, cell.shape);
-    if (polygon.rectangle) {
+    const Polygon polygon = polygon_of(*plane, cell.shape, Room::in(outline_, cell.at, cell.shape));
+    if (polygon.rectangle && polygon.at[2].u == kHalf && polygon.at[2].v == kHalf) {
       at[plane->axis] += double(plane->h) / (1 << kHeightBits);
     } else if (polygon.size >= 3) {
       vertices_.clear();
-      spread(polygon, *plane, cell.shape, 1, vertices_);
+      spread(polygon, *plane, cell.shape, 1, {}, vertices_);
       at = place(cell, *plane, vertices_[0]);
     }
   }
@@ -163,7 +163,7 @@ double LeafErrors::of_single(const TreeCell& cell, const Plane* plane) {
 
 void LeafErrors::decode_few(const TreeCell& cell, const Plane& plane, const Polygon& polygon) {
   vertices_.clear();
-  spread(polygon, plane, cell.shape, cell.count(), vertices_);
+  spread(polygon, plane, cell.shape, cell.count(), {}, vertices_);
   // Far places fill the rest, so that loops over all of them have a fixed length.
   for (auto& row : few_.at) row.fill(kFarPlace);
   for (std::uint32_t i = 0; i < cell.count(); ++i) {

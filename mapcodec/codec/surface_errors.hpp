@@ -23,8 +23,8 @@ class LeafErrors {
   static constexpr std::uint32_t kFew = 16;
   static constexpr std::uint32_t kFewProbes = 16, kManyProbes = 64;
 
-  LeafErrors(std::span<const Units> points, unsigned depth)
-      : points_(points), moments_(points), coverage_(points, depth) {}
+  LeafErrors(std::span<const Units> points, unsigned depth, const Outline& outline)
+      : points_(points), outline_(outline), moments_(points), coverage_(points, depth) {}
 
   [[nodiscard]] Moments moments(const TreeCell& cell) const {
     return moments_.about(cell.begin, cell.end, cell.twice_center());
@@ -61,6 +61,7 @@ class LeafErrors {
   static double squared(const Place& a, const Units& b);
 
   std::span<const Units> points_;
+  Outline outline_;
   MomentTable moments_;
   Coverage coverage_;
   static constexpr float kFarPlace = 1e12F;

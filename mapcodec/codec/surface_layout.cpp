@@ -16,12 +16,42 @@ double rounded_to_float(double c) {
   return f;
 }
 
+constexpr std::uint8_t kFitted = 0x80;  // with the depth
+
+Status read_fit(ByteReader& in, Header& h) {
+  h.fitted = (h.depth & kFitted) != 0;
+  if (!h.fitted) return {};
+  h.depth &= static_cast<std::uint8_t>(~kFitted);
+  h.borders = in.u8();
+  bool valid = h.borders < 64;
+  for (std::uint32_t& e : h.extent) {
+    const std::uint64_t steps = in.varint();
+    valid = valid && steps > 0 && steps <= kMostExtent;
+    e = static_cast<std::uint32_t>(steps);
+  }
+  MAPCODEC_TRY(in.status("surface header"));
+  if (!valid) return make_error(ErrorCode::kMalformed, "surface extent or borders out of range");
+  return {};
+}
+
 }  // namespace
+
+Outline outline_of(const Header& header) {
+  Outline o;
+  o.fitted = header.fitted;
+  o.borders = header.borders;
+  for (std::size_t d = 0; d < 3 && o.fitted; ++d) o.end[d] = header.extent[d] * kStepUnits;
+  return o;
+}
 
 void write_header(ByteWriter& out, const Header& header) {
   out.u8(header.voxel_shift);
   for (const std::int64_t b : header.base) out.signed_varint(b);
-  out.u8(header.depth);
+  out.u8(header.fitted ? header.depth | kFitted : header.depth);
+  if (header.fitted) {
+    out.u8(header.borders);
+    for (const std::uint32_t e : header.extent) out.varint(e);
+  }
   out.u8(header.count_shift);
   out.u8(header.block_bits);
 }
@@ -31,6 +61,7 @@ Result<Header> read_header(ByteReader& in) {
   h.voxel_shift = in.u8();
   for (std::int64_t& b : h.base) b = in.signed_varint();
   h.depth = in.u8();
+  MAPCODEC_TRY(read_fit(in, h));
   h.count_shift = in.u8();
   h.block_bits = in.u8();
   MAPCODEC_TRY(in.status("surface header"));
@@ -49,15 +80,17 @@ Result<Header> read_header(ByteReader& in) {
 }
 
 std::vector<SubUnits> points_of(std::vector<Leaf>& leaves, std::span<const Block> blocks, std::size_t count,
-                                const Header& header) {
+                                const Header& header, std::span<const Joint> joints) {
   std::uint64_t sum = 0;
   for (const Leaf& leaf : leaves) sum += leaf.block < 0 ? leaf.count : 0;
   for (const Block& block : blocks) sum += block.count;
   if (sum != count) return {};
-  std::vector<SubUnits> points = spread_leaves(leaves, blocks, header.block_bits, count);
-  const std::int32_t most = std::int32_t{1} << (header.depth + kSubUnitBits);
+  const Surroundings around = surroundings_of(leaves, joints, outline_of(header));
+  std::vector<SubUnits> points = spread_leaves(leaves, blocks, header.block_bits, count, around);
+  const std::int32_t over = header.fitted ? kOverlap << kSubUnitBits : 0;
+  const std::int32_t most = (std::int32_t{1} << (header.depth + kSubUnitBits)) + over;
   for (SubUnits& p : points) {
-    for (std::int32_t& v : p) v = std::clamp(v, 0, most);
+    for (std::int32_t& v : p) v = std::clamp(v, -over, most);
   }
   return points;
 }
@@ -79,10 +112,12 @@ std::vector<Vec3> positions(const std::vector<SubUnits>& points, const std::arra
 }
 
 VoxelOrder order_by_voxels(const std::vector<SubUnits>& points, unsigned depth, std::uint8_t voxel_shift) {
+  const std::int32_t most = std::int32_t{1} << (depth + kSubUnitBits);
   const auto voxel_of = [&](const SubUnits& p) {
-    return VoxelCoord{static_cast<std::uint32_t>(p[0]) >> voxel_shift,
-                      static_cast<std::uint32_t>(p[1]) >> voxel_shift,
-                      static_cast<std::uint32_t>(p[2]) >> voxel_shift};
+    VoxelCoord at;
+    for (std::size_t d = 0; d < 3; ++d)
+      at[d] = static_cast<std::uint32_t>(std::clamp(p[d], 0, most)) >> voxel_shift;
+    return at;
   };
   std::vector<KeyedIndex> keys(points.size()), scratch;
   for (std::size_t i = 0; i < points.size(); ++i) {

@@ -131,6 +131,7 @@ class Models {
 
   int voxel_bits = 0;    ///< log2 of the voxels' side in blocks [units]; 0: no blocks
   int count_shift = 31;  ///< counts above 8 are coded to n >> count_shift
+  Outline outline;       ///< where cells can hold surface
 
   template <class Visitor>
   void visit(Visitor&& f);

@@ -51,7 +51,7 @@ class Optimizer {
         forward_(settings.forward_weight),
         lambda_(settings.lambda_steps * kStep2),
         prices_(models),
-        errors_(points, depth) {
+        errors_(points, depth, models.outline) {
     if (models.voxel_bits > 0) voxels_ = VoxelErrors(points, models.voxel_bits, forward_, lambda_);
   }
 
@@ -178,7 +178,7 @@ class Optimizer {
   void consider_center(const TreeCell& cell, const Moments& m, const CellContext& c, const Planes& p,
                        Candidate& best) const {
     const bool inherits = p.inherited != nullptr;
-    if (inherits && polygon_of(*p.inherited, cell.shape).size >= 3) return;
+    if (inherits && polygon_of(*p.inherited, cell.shape, prices_.room(cell)).size >= 3) return;
     Candidate r;
     set_error(r, errors_.at_center(cell, m));
     r.bits = p.none_bits + prices_.leaf(cell, c, inherits ? PlaneState::inherited : PlaneState::none);
@@ -203,7 +203,7 @@ class Optimizer {
     r.bits = (own ? p.own_bits : p.none_bits) +
              prices_.leaf(cell, c, own ? PlaneState::own : PlaneState::inherited);
     if (0.25 * mix(beside, 0) + lambda_ * r.bits >= std::min(limit, cost_of(best))) return;
-    const Polygon polygon = polygon_of(plane, cell.shape);
+    const Polygon polygon = polygon_of(plane, cell.shape, prices_.room(cell));
     if (polygon.size < 3) return;
     if (cell.count() <= LeafErrors::kFew) {
       consider_few(cell, c, plane, polygon, beside, r, best);

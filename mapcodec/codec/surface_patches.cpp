@@ -24,6 +24,7 @@ struct Tree {
   surface::Header header;
   std::vector<Leaf> leaves;
   std::vector<surface::Block> blocks;
+  std::vector<surface::Joint> joints;
 };
 
 Status check(const Tree& tree, std::uint64_t count, const DecodeLimits& limits) {
@@ -49,12 +50,14 @@ Result<Tree> read_tree(ByteSpan bytes, std::uint64_t count, const DecodeLimits& 
   // The models are too large for small stacks.
   const auto walk = std::make_unique<surface::Walk<SymbolReader>>(reader);
   walk->models().count_shift = tree.header.count_shift;
+  walk->models().outline = outline_of(tree.header);
   walk->models().voxel_bits = tree.header.block_bits;
   if (!walk->run(static_cast<std::uint32_t>(count), tree.header.depth, ~0u)) {
     return make_error(ErrorCode::kTruncated, "surface tree ends too early");
   }
   tree.leaves = std::move(walk->leaves());
   tree.blocks = walk->blocks();
+  tree.joints = walk->joints();
   MAPCODEC_TRY(check(tree, count, limits));
   return tree;
 }
@@ -130,9 +133,12 @@ double noise_of(const Leaf& leaf, const SurfacePatch& patch, double unit) {
 }
 
 /// @return false if the leaf has no piece of a plane.
-bool patch_of_leaf(const Leaf& leaf, const Frame& frame, SurfacePatch& patch) {
+bool patch_of_leaf(const Leaf& leaf, const surface::Outline& outline, const Frame& frame,
+                   SurfacePatch& patch) {
   if (!leaf.has_plane || leaf.count == 0) return false;
-  surface::Polygon polygon = polygon_of(leaf.plane, leaf.shape);
+  const surface::Room room = surface::Room::in(outline, leaf.at, leaf.shape);
+  surface::Polygon polygon =
+      polygon_of(leaf.plane, leaf.shape, leaf.block < 0 ? room : surface::Room::whole(leaf.shape));
   if (polygon.size >= 3 && leaf.wedged) cut(polygon, leaf.wedge);
   if (polygon.size < 3 || twice_area(polygon) <= 0) return false;
   for (int i = 0; i < polygon.size; ++i)
@@ -159,10 +165,11 @@ void in_point_order(const std::vector<Leaf>& leaves, F&& f) {
 std::vector<SurfacePatch> patches_of(const Tree& tree, const Quantizer& lattice,
                                      std::vector<std::uint32_t>* owner) {
   const Frame frame = frame_of(tree.header, lattice);
+  const surface::Outline outline = outline_of(tree.header);
   std::vector<SurfacePatch> patches;
   in_point_order(tree.leaves, [&](const Leaf& leaf) {
     SurfacePatch patch;
-    const bool any = patch_of_leaf(leaf, frame, patch);
+    const bool any = patch_of_leaf(leaf, outline, frame, patch);
     if (owner != nullptr) {
       owner->insert(owner->end(), leaf.count, any ? static_cast<std::uint32_t>(patches.size()) : kNoPatch);
     }
@@ -184,7 +191,7 @@ Result<std::vector<SurfacePatch>> read_surface_patches(ByteSpan bytes, std::uint
   MAPCODEC_ASSIGN(Tree tree, read_tree(bytes, count, limits));
   if (!tree.blocks.empty()) {
     // The surface through voxels depends on where all other points lie.
-    (void)surface::points_of(tree.leaves, tree.blocks, count, tree.header);
+    (void)surface::points_of(tree.leaves, tree.blocks, count, tree.header, tree.joints);
   }
   return patches_of(tree, lattice, nullptr);
 }
@@ -196,7 +203,8 @@ Result<SurfacePatchPoints> read_surface_patch_points(ByteSpan bytes, std::uint64
   if (tree.header.voxel_shift == surface::kNoVoxels) {
     return make_error(ErrorCode::kMalformed, "surface tile has no order for channels");
   }
-  const std::vector<SubUnits> points = surface::points_of(tree.leaves, tree.blocks, count, tree.header);
+  const std::vector<SubUnits> points =
+      surface::points_of(tree.leaves, tree.blocks, count, tree.header, tree.joints);
   SurfacePatchPoints r;
   std::vector<std::uint32_t> owner;
   owner.reserve(count);

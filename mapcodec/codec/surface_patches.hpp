@@ -15,7 +15,7 @@
 namespace mapcodec {
 
 /// A flat, convex piece of surface [m, map frame]. The distance of a point p from its plane is
-/// normal . (p - center).
+/// normal . (p - center). Near other patches decoded points leave it, a step at most, to meet theirs.
 struct SurfacePatch {
   Vec3 center{0, 0, 0};         ///< centroid of the polygon
   Vec3 normal{0, 0, 1};         ///< unit; its side has no meaning

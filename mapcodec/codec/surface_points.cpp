@@ -15,22 +15,24 @@ SubUnits center_of(const Leaf& leaf) {
 
 }  // namespace
 
-void append_points(const Leaf& leaf, std::vector<Vertex>& scratch, std::vector<SubUnits>& out) {
+void append_points(const Leaf& leaf, const Surroundings& around, std::vector<Vertex>& scratch,
+                   std::vector<SubUnits>& out) {
   const SubUnits center = center_of(leaf);
-  Polygon polygon;
-  if (leaf.has_plane) polygon = polygon_of(leaf.plane, leaf.shape);
-  if (polygon.size >= 3 && leaf.wedged) cut(polygon, leaf.wedge);
+  const Polygon polygon = polygon_of(leaf, around);
   if (polygon.size < 3) {
     out.insert(out.end(), leaf.count, center);
     return;
   }
   scratch.clear();
-  spread(polygon, leaf.plane, leaf.shape, leaf.count, scratch);
+  const Seam* seam = around.of(leaf);
+  spread(polygon, leaf.plane, leaf.shape, leaf.count, seam != nullptr ? seam->tilt : Tilt{}, scratch);
+  const bool at_border = reaches_over(leaf, around.outline);
   const unsigned k = leaf.plane.axis, u = (k + 1) % 3, v = (k + 2) % 3;
   constexpr int kDown = kVertexBits + 1 - kSubUnitBits;
   for (std::size_t i = 0; i < scratch.size(); ++i) {
-    const Vertex& x = scratch[i];
-    const std::int64_t height = height_at(leaf.plane, leaf.shape, x) + noise_offset(leaf.noise, i);
+    Vertex& x = scratch[i];
+    if (at_border) overlap(leaf, around.outline, x);
+    const std::int64_t height = height_of(leaf, around, x) + noise_offset(leaf.noise, i);
     SubUnits p = center;
     p[u] += static_cast<std::int32_t>(((std::int64_t{x.u} << leaf.shape[u]) + (1 << (kDown - 1))) >> kDown);
     p[v] += static_cast<std::int32_t>(((std::int64_t{x.v} << leaf.shape[v]) + (1 << (kDown - 1))) >> kDown);

@@ -2,7 +2,7 @@
 // Leaves of a surface tree to points (FORMAT.md 10.5).
 #pragma once
 
-#include "mapcodec/codec/surface_walk.hpp"
+#include "mapcodec/codec/surface_seams.hpp"
 
 namespace mapcodec::surface {
 
@@ -12,6 +12,7 @@ inline constexpr int kSubUnitBits = 4;  ///< decoded points lie on a lattice of 
 using SubUnits = std::array<std::int32_t, 3>;
 
 /// Appends the points of one leaf. @param scratch  any; reused.
-void append_points(const Leaf& leaf, std::vector<Vertex>& scratch, std::vector<SubUnits>& out);
+void append_points(const Leaf& leaf, const Surroundings& around, std::vector<Vertex>& scratch,
+                   std::vector<SubUnits>& out);
 
 }  // namespace mapcodec::surface

@@ -27,22 +27,48 @@ struct Weights {
   std::int64_t u, v;
 };
 
-void spread_rectangle(std::int32_t u0, std::int32_t v0, std::int32_t u1, std::int32_t v1, const Weights& w,
-                      std::uint32_t count, std::vector<Vertex>& out) {
+std::int64_t density_at(const Tilt& tilt, std::int64_t u, std::int64_t v) {
+  constexpr std::int64_t kMiddle = std::int64_t{256} << kVertexBits, kLeast = kMiddle / 8;
+  return std::max(kMiddle + tilt.u * u + tilt.v * v, kLeast);
+}
+
+/// The share (of 65536) of an area that the lower of two parts of the points take, where the density goes
+/// from r0 to r1.
+std::int64_t tilted_share(std::uint32_t lower, std::uint32_t count, std::int64_t r0, std::int64_t r1) {
+  const std::int64_t even = (std::int64_t{lower} << 16) / count;
+  return even + (even * (65536 - even) >> 16) * (r1 - r0) / (r1 + r0);
+}
+
+struct Rectangle {
+  std::int32_t u0, v0, u1, v1;
+};
+
+/// Where `lower` of `count` points end.
+std::int32_t cut_rectangle(const Rectangle& r, bool is_u, std::uint32_t lower, std::uint32_t count,
+                           const Tilt& tilt) {
+  const std::int32_t x0 = is_u ? r.u0 : r.v0, x1 = is_u ? r.u1 : r.v1;
+  const std::int64_t length = std::int64_t{x1} - x0;
+  if (!tilt.any()) return static_cast<std::int32_t>(x0 + length * lower / count);
+  const std::int64_t y = is_u ? (r.v0 + r.v1) >> 1 : (r.u0 + r.u1) >> 1;
+  const std::int64_t r0 = is_u ? density_at(tilt, x0, y) : density_at(tilt, y, x0);
+  const std::int64_t r1 = is_u ? density_at(tilt, x1, y) : density_at(tilt, y, x1);
+  return static_cast<std::int32_t>(x0 + (length * tilted_share(lower, count, r0, r1) >> 16));
+}
+
+void spread_rectangle(const Rectangle& r, const Weights& w, std::uint32_t count, const Tilt& tilt,
+                      std::vector<Vertex>& out) {
   if (count == 1) {
-    out.push_back({(u0 + u1) >> 1, (v0 + v1) >> 1});
+    out.push_back({(r.u0 + r.u1) >> 1, (r.v0 + r.v1) >> 1});
     return;
   }
   const std::uint32_t lower = count / 2;
-  if (w.u * (u1 - u0) >= w.v * (v1 - v0)) {
-    const auto middle = static_cast<std::int32_t>(u0 + std::int64_t{u1 - u0} * lower / count);
-    spread_rectangle(u0, v0, middle, v1, w, lower, out);
-    spread_rectangle(middle, v0, u1, v1, w, count - lower, out);
-  } else {
-    const auto middle = static_cast<std::int32_t>(v0 + std::int64_t{v1 - v0} * lower / count);
-    spread_rectangle(u0, v0, u1, middle, w, lower, out);
-    spread_rectangle(u0, middle, u1, v1, w, count - lower, out);
-  }
+  const bool is_u = w.u * (r.u1 - r.u0) >= w.v * (r.v1 - r.v0);
+  const std::int32_t at = cut_rectangle(r, is_u, lower, count, tilt);
+  Rectangle left = r, right = r;
+  (is_u ? left.u1 : left.v1) = at;
+  (is_u ? right.u0 : right.v0) = at;
+  spread_rectangle(left, w, lower, tilt, out);
+  spread_rectangle(right, w, count - lower, tilt, out);
 }
 
 Vertex centroid(const Polygon& p) {
@@ -105,16 +131,29 @@ std::int64_t place_in_slab(std::int64_t length, std::int64_t w0, std::int64_t w1
   return x;
 }
 
-/// The coordinate below which `lower` of `count` parts of the area lie.
-std::int32_t cut_position(const Polygon& p, bool is_u, std::uint32_t lower, std::uint32_t count) {
+/// Twice the area that the lower of two parts of the points take; the polygon reaches from x0 to x1.
+std::int64_t lower_area(const Polygon& p, bool is_u, std::uint32_t lower, std::uint32_t count,
+                        const Tilt& tilt, std::int64_t x0, std::int64_t x1) {
+  const std::int64_t total = twice_area(p);
+  if (!tilt.any()) return total / count * lower + total % count * lower / count;
+  std::int64_t y = 0;
+  for (int i = 0; i < p.size; ++i) y += along(p.at[i], !is_u);
+  y /= p.size;
+  const std::int64_t r0 = is_u ? density_at(tilt, x0, y) : density_at(tilt, y, x0);
+  const std::int64_t r1 = is_u ? density_at(tilt, x1, y) : density_at(tilt, y, x1);
+  return total * tilted_share(lower, count, r0, r1) >> 16;
+}
+
+/// The coordinate below which `lower` of `count` points lie.
+std::int32_t cut_position(const Polygon& p, bool is_u, std::uint32_t lower, std::uint32_t count,
+                          const Tilt& tilt) {
   std::array<std::int32_t, 12> stops;
   for (int i = 0; i < p.size; ++i) {
     int j = i;
     for (; j > 0 && stops[j - 1] > along(p.at[i], is_u); --j) stops[j] = stops[j - 1];
     stops[j] = along(p.at[i], is_u);
   }
-  const std::int64_t total = twice_area(p);
-  std::int64_t goal = total / count * lower + total % count * lower / count;
+  std::int64_t goal = lower_area(p, is_u, lower, count, tilt, stops[0], stops[p.size - 1]);
   std::int64_t w0 = width_at(p, is_u, stops[0]);
   for (int i = 1; i < p.size; ++i) {
     const std::int64_t length = std::int64_t{stops[i]} - stops[i - 1];
@@ -150,7 +189,8 @@ Polygon part(const Polygon& p, bool is_u, std::int32_t at, bool lower) {
   return r;
 }
 
-void spread_polygon(const Polygon& p, const Weights& w, std::uint32_t count, std::vector<Vertex>& out) {
+void spread_polygon(const Polygon& p, const Weights& w, std::uint32_t count, const Tilt& tilt,
+                    std::vector<Vertex>& out) {
   if (count == 1) {
     out.push_back(centroid(p));
     return;
@@ -164,12 +204,12 @@ void spread_polygon(const Polygon& p, const Weights& w, std::uint32_t count, std
   }
   const bool is_u = w.u * (u1 - u0) >= w.v * (v1 - v0);
   const std::uint32_t lower = count / 2;
-  const std::int32_t at = cut_position(p, is_u, lower, count);
+  const std::int32_t at = cut_position(p, is_u, lower, count, tilt);
   Polygon left = part(p, is_u, at, true), right = part(p, is_u, at, false);
   if (left.size < 3) left = p;
   if (right.size < 3) right = p;
-  spread_polygon(left, w, lower, out);
-  spread_polygon(right, w, count - lower, out);
+  spread_polygon(left, w, lower, tilt, out);
+  spread_polygon(right, w, count - lower, tilt, out);
 }
 
 // cos and sin of sixteenths of a turn in 1/4096.
@@ -192,23 +232,33 @@ void clip(Polygon& polygon, std::int64_t c, std::int64_t gu, std::int64_t gv) {
   polygon = r;
 }
 
-Polygon polygon_of(const Plane& plane, const CellShape& shape) {
+Polygon rectangle_of(const Room& room, const CellShape& shape, unsigned axis) {
+  const auto vertex = [&](std::int32_t units, unsigned d) {
+    return static_cast<std::int32_t>((std::int64_t{units} * (2 * kHalf) >> shape[d]) - kHalf);
+  };
+  const unsigned u = (axis + 1) % 3, v = (axis + 2) % 3;
+  const std::int32_t u0 = vertex(room.begin[u], u), u1 = vertex(room.end[u], u);
+  const std::int32_t v0 = vertex(room.begin[v], v), v1 = vertex(room.end[v], v);
   Polygon p;
   p.size = 4;
-  p.at[0] = {-kHalf, -kHalf};
-  p.at[1] = {kHalf, -kHalf};
-  p.at[2] = {kHalf, kHalf};
-  p.at[3] = {-kHalf, kHalf};
+  p.at[0] = {u0, v0};
+  p.at[1] = {u1, v0};
+  p.at[2] = {u1, v1};
+  p.at[3] = {u0, v1};
   p.rectangle = true;
-  const std::int64_t half = half_side(shape[plane.axis]);
+  return p;
+}
+
+Polygon polygon_of(const Plane& plane, const CellShape& shape, const Room& room) {
+  const unsigned k = plane.axis;
+  const std::int64_t half = half_side(shape[k]);
+  const std::int64_t top = std::int64_t{room.end[k]} * (1 << kHeightBits) - half;
+  const std::int64_t bottom = half - std::int64_t{room.begin[k]} * (1 << kHeightBits);
   const std::int64_t reach = std::abs(std::int64_t{plane.a}) + std::abs(std::int64_t{plane.b});
-  if (std::abs(std::int64_t{plane.h}) > half + reach) {
-    p.size = 0;
-    p.rectangle = false;
-    return p;
-  }
-  if (plane.h + reach > half) clip(p, plane.h - half, plane.a, plane.b);
-  if (-plane.h + reach > half) clip(p, -plane.h - half, -std::int64_t{plane.a}, -std::int64_t{plane.b});
+  if (std::abs(std::int64_t{plane.h}) > half + reach) return {};
+  Polygon p = rectangle_of(room, shape, k);
+  if (plane.h + reach > top) clip(p, plane.h - top, plane.a, plane.b);
+  if (-plane.h + reach > bottom) clip(p, -plane.h - bottom, -std::int64_t{plane.a}, -std::int64_t{plane.b});
   return p;
 }
 
@@ -228,13 +278,13 @@ std::int64_t twice_area(const Polygon& p) {
   return sum;
 }
 
-int lower_share(const Plane& plane, const CellShape& shape, unsigned split_axis) {
-  Polygon p = polygon_of(plane, shape);
+int lower_share(const Plane& plane, const CellShape& shape, const Room& room, unsigned split_axis) {
+  Polygon p = polygon_of(plane, shape, room);
   const std::int64_t all = twice_area(p);
   if (p.size < 3 || all < 256) return -1;
   if (split_axis == plane.axis) {
     clip(p, plane.h, plane.a, plane.b);
-  } else if (p.rectangle) {
+  } else if (p.rectangle && room.end[split_axis] == 1 << shape[split_axis]) {
     return 128;
   } else if (split_axis == (plane.axis + 1u) % 3) {
     clip(p, 0, kHalf, 0);
@@ -246,7 +296,7 @@ int lower_share(const Plane& plane, const CellShape& shape, unsigned split_axis)
 }
 
 void spread(const Polygon& polygon, const Plane& plane, const CellShape& shape, std::uint32_t count,
-            std::vector<Vertex>& out) {
+            const Tilt& tilt, std::vector<Vertex>& out) {
   if (count == 0) return;
   if (polygon.size < 3) {
     out.insert(out.end(), count, Vertex{0, 0});
@@ -255,9 +305,10 @@ void spread(const Polygon& polygon, const Plane& plane, const CellShape& shape, 
   const Weights w{stretch(half_side(shape[(plane.axis + 1u) % 3]), plane.a),
                   stretch(half_side(shape[(plane.axis + 2u) % 3]), plane.b)};
   if (polygon.rectangle) {
-    spread_rectangle(polygon.at[0].u, polygon.at[0].v, polygon.at[2].u, polygon.at[2].v, w, count, out);
+    const Vertex &low = polygon.at[0], &high = polygon.at[2];
+    spread_rectangle({low.u, low.v, high.u, high.v}, w, count, tilt, out);
   } else {
-    spread_polygon(polygon, w, count, out);
+    spread_polygon(polygon, w, count, tilt, out);
   }
 }
 

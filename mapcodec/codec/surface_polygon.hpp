@@ -4,7 +4,7 @@
 
 #include <vector>
 
-#include "mapcodec/codec/surface_plane.hpp"
+#include "mapcodec/codec/surface_outline.hpp"
 
 namespace mapcodec::surface {
 
@@ -31,20 +31,31 @@ struct Wedge {
 /// Keeps where c + (gu u + gv v) / 32768 <= 0.
 void clip(Polygon& polygon, std::int64_t c, std::int64_t gu, std::int64_t gv);
 
-/// The plane inside its cell; no corner if it misses the cell.
-[[nodiscard]] Polygon polygon_of(const Plane& plane, const CellShape& shape);
+/// The room of a cell, as it looks along `axis`.
+[[nodiscard]] Polygon rectangle_of(const Room& room, const CellShape& shape, unsigned axis);
+
+/// The plane inside its cell's room; no corner if it misses the cell.
+[[nodiscard]] Polygon polygon_of(const Plane& plane, const CellShape& shape, const Room& room);
 void cut(Polygon& polygon, const Wedge& wedge);
 
 /// Twice the area in vertex units.
 [[nodiscard]] std::int64_t twice_area(const Polygon& polygon);
 
 /// Share (0..256) of the plane's polygon in the lower half of the cell along `split_axis`.
-[[nodiscard]] int lower_share(const Plane& plane, const CellShape& shape, unsigned split_axis);
+[[nodiscard]] int lower_share(const Plane& plane, const CellShape& shape, const Room& room,
+                              unsigned split_axis);
+
+/// By how much the density of points changes from a cell's middle to its upper faces, in 1/256.
+struct Tilt {
+  std::int32_t u = 0, v = 0;
+  [[nodiscard]] bool any() const { return u != 0 || v != 0; }
+};
 
 /// `count` points evenly over the polygon: it is cut across its longer side into pieces of areas as count/2
-/// rounded down to the rest, again and again; each last piece gives its centroid. Appends to `out`.
+/// rounded down to the rest, again and again; each last piece gives its centroid. With a tilt the areas
+/// differ as the density does. Appends to `out`.
 void spread(const Polygon& polygon, const Plane& plane, const CellShape& shape, std::uint32_t count,
-            std::vector<Vertex>& out);
+            const Tilt& tilt, std::vector<Vertex>& out);
 
 /// Height of the plane over a vertex, kept inside the cell.
 [[nodiscard]] inline std::int64_t height_at(const Plane& p, const CellShape& shape, const Vertex& x) {

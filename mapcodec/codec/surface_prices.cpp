@@ -43,7 +43,7 @@ double Prices::division(const TreeCell& cell, const CellContext& c, PlaneState s
                         int halves, std::uint32_t lower) const {
   CostMeter meter;
   models_.divided(meter, true, c, static_cast<int>(state));
-  const int share = plane != nullptr ? lower_share(*plane, cell.shape, cell.axis()) : -1;
+  const int share = plane != nullptr ? lower_share(*plane, cell.shape, room(cell), cell.axis()) : -1;
   models_.halves(meter, halves, cell.count(), c, share);
   if (halves == 0) models_.lower_count(meter, lower, cell.count(), share);
   return meter.bits();
@@ -53,7 +53,8 @@ double Prices::block_division(const TreeCell& cell, const Plane* plane, int halv
   CellContext c = context(cell);
   c.crowd = kUncounted;
   CostMeter meter;
-  models_.halves(meter, halves, 2, c, plane != nullptr ? lower_share(*plane, cell.shape, cell.axis()) : -1);
+  models_.halves(meter, halves, 2, c,
+                 plane != nullptr ? lower_share(*plane, cell.shape, room(cell), cell.axis()) : -1);
   return meter.bits();
 }
 

@@ -30,6 +30,9 @@ class Prices {
     return models_.voxel_bits > 0 && cell.count() >= kLeastInBlock &&
            block_levels(cell.shape, models_.voxel_bits) > 0;
   }
+  [[nodiscard]] Room room(const TreeCell& cell) const {
+    return Room::in(models_.outline, cell.at, cell.shape);
+  }
   [[nodiscard]] int voxel_bits() const { return models_.voxel_bits; }
 
   [[nodiscard]] double no_plane(const CellContext& c, bool inherits) const;

@@ -142,7 +142,7 @@ Result<std::unique_ptr<Content>> code_positions(const PointCloud& tile, const Ma
   c->step_m = step_m;
   c->effort = settings.effort;
   const Quantizer lattice{schema.origin, step_m, schema.coordinates.kind};
-  MAPCODEC_ASSIGN(c->encoding, encode_surface(tile.xyz, lattice, {settings.effort}));
+  MAPCODEC_ASSIGN(c->encoding, encode_surface(tile.xyz, lattice, {settings.effort, settings.borders}));
   c->no_voxels = c->encoding.header.voxel_shift;
   SurfaceTile& r = c->figures;
   const std::vector<Vec3>& decoded = c->encoding.decoded;

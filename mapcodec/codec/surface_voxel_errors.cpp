@@ -18,7 +18,10 @@ constexpr double kThinSquared = 16;  // mean [units^2] below which points are ta
 class VoxelLeaf {
  public:
   VoxelLeaf(const TreeCell& cell, const Plane& plane, LeafErrors& errors)
-      : cell_(cell), plane_(plane), errors_(errors), polygon_(polygon_of(plane, cell.shape)) {
+      : cell_(cell),
+        plane_(plane),
+        errors_(errors),
+        polygon_(polygon_of(plane, cell.shape, Room::whole(cell.shape))) {
     const Moments m = errors.moments(cell);
     around_ = m.second[0] + m.second[1] + m.second[2];
     beside_ = squared_distances(m, cell.shape, plane);

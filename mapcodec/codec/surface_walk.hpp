@@ -34,7 +34,15 @@ struct Leaf {
   Wedge wedge;
   std::int32_t block = -1;  ///< of a voxel: its block, which has the count
   std::uint8_t noise = 0;
+  std::int32_t seam = -1;  ///< what its neighbours change, if anything
 };
+
+/// Two leaves with planes that touch: `to` beyond a face of `from`, as large or larger.
+struct Joint {
+  std::int32_t from, to;
+  std::uint8_t face;  ///< 2 axis, 1 more for the upper one
+};
+inline constexpr std::uint32_t kLeastJoined = 6;  ///< points of leaves that joints are noted of
 
 /// A cell whose occupied voxels are told.
 struct Block {
@@ -76,6 +84,7 @@ class Walk {
           code_cell(i, level % 3);
         }
       }
+      note_joints();
       if constexpr (requires { side_.end_level(); }) side_.end_level();
       // Every cell holds a point: more of them come only from damaged bytes.
       if (last || next_.size() > count) break;
@@ -90,6 +99,7 @@ class Walk {
   /// Voxels among them have neither count nor plane until settle_blocks gives them.
   [[nodiscard]] std::vector<Leaf>& leaves() { return leaves_; }
   [[nodiscard]] const std::vector<Block>& blocks() const { return blocks_; }
+  [[nodiscard]] const std::vector<Joint>& joints() const { return joints_; }
   Models& models() { return models_; }
 
  private:
@@ -220,7 +230,9 @@ class Walk {
   }
 
   void divide(Cell& cell, const CellContext& c, unsigned axis, const Choice* choice) {
-    const int share = cell.has_plane ? lower_share(cell.plane, shape_, axis) : -1;
+    const int share = cell.has_plane
+                          ? lower_share(cell.plane, shape_, Room::in(models_.outline, cell.at, shape_), axis)
+                          : -1;
     int halves = 0;
     std::uint32_t lower = 0;
     if (choice != nullptr) {
@@ -272,6 +284,27 @@ class Walk {
     leaves_.push_back(leaf);
   }
 
+  [[nodiscard]] static bool can_join(const Leaf& leaf) {
+    return leaf.has_plane && leaf.block < 0 && leaf.count >= kLeastJoined;
+  }
+
+  /// Notes each pair of this level's leaves and earlier ones once.
+  void note_joints() {
+    for (std::size_t i = 0; i < cells_.size(); ++i) {
+      const Cell& cell = cells_[i];
+      if (cell.state != State::leaf || !can_join(leaves_[static_cast<std::size_t>(cell.leaf)])) continue;
+      for (unsigned f = 0; f < 6; ++f) {
+        const std::int32_t l = cell.link[f];
+        if (l == kNone || (l >= 0 && static_cast<std::size_t>(l) > i)) continue;
+        const bool is_leaf = l < 0 || cells_[static_cast<std::size_t>(l)].state == State::leaf;
+        if (!is_leaf) continue;
+        const std::int32_t to = l < 0 ? -2 - l : cells_[static_cast<std::size_t>(l)].leaf;
+        if (can_join(leaves_[static_cast<std::size_t>(to)]))
+          joints_.push_back({cell.leaf, to, static_cast<std::uint8_t>(f)});
+      }
+    }
+  }
+
   /// Gives the children their neighbours, now that all of this level is known.
   void link_children(unsigned axis) {
     for (const Cell& cell : cells_) {
@@ -304,6 +337,7 @@ class Walk {
   std::vector<Cell> cells_, next_;
   std::vector<Leaf> leaves_;
   std::vector<Block> blocks_;
+  std::vector<Joint> joints_;
 };
 
 }  // namespace mapcodec::surface

@@ -10,6 +10,7 @@
 #include "mapcodec/base/result.hpp"
 #include "mapcodec/cloud/map_schema.hpp"
 #include "mapcodec/cloud/point_cloud.hpp"
+#include "mapcodec/cloud/tile_borders.hpp"
 #include "mapcodec/cloud/tile_key.hpp"
 
 namespace mapcodec {
@@ -65,6 +66,7 @@ struct TileSettings {
   /// points, surface: for searches. Where no channel is coded, the RMS is measured on a part of the points
   /// (within about 1 %), and neither the largest nor the density error is.
   bool rough_errors = false;
+  TileBorders borders;  ///< surface: where nothing is known of other tiles, its surface ends with its points
   PaperSettings paper;
 };
 

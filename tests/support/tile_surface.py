@@ -215,13 +215,13 @@ class Cell:
 class Leaf:
     def __init__(self, cell, shape):
         self.at, self.shape, self.count, self.plane, self.block = cell.at, tuple(shape), cell.count, cell.plane, cell.block
-        self.wedge, self.noise = None, 0
+        self.wedge, self.noise, self.seam = None, 0, None
 
 
 class Tree:
-    def __init__(self, symbols, block_bits):
-        self.s, self.v = symbols, block_bits
-        self.leaves, self.blocks = [], []
+    def __init__(self, symbols, block_bits, outline):
+        self.s, self.v, self.outline = symbols, block_bits, outline
+        self.leaves, self.blocks, self.joints = [], [], []
 
     def read(self, count, depth):
         self.shape = [depth] * 3
@@ -236,6 +236,7 @@ class Tree:
                     self.read_cell(i, cell, level % 3)
             if len(self.next) > count:
                 raise Damaged("more cells than points")
+            self.note_joints()
             self.link_children(level % 3)
             self.shape[level % 3] -= 1
             self.cells, level = self.next, level + 1
@@ -304,7 +305,8 @@ class Tree:
         size, crowd, _, below, above = c
         cell.state = "divided"
         in_block = cell.block >= 0
-        share = lower_share(cell.plane, self.shape, axis) if cell.plane is not None else -1
+        room = self.outline.room(cell.at, self.shape)
+        share = lower_share(cell.plane, self.shape, room, axis) if cell.plane is not None else -1
         halves = self.s.halves(2 if in_block else cell.count, crowd, size, below, above, share)
         lower = 0
         if not in_block:
@@ -329,6 +331,16 @@ class Tree:
                 leaf.wedge = (self.s.tree("angle", 0, 4), self.s.tree("offset", 0, 5))
         cell.leaf = len(self.leaves)
         self.leaves.append(leaf)
+
+    def note_joints(self):
+        """Pairs of touching leaves: (from, to beyond a face of it, that face)."""
+        for i, cell in enumerate(self.cells):
+            for face, l in enumerate(cell.link):
+                if cell.state != "leaf" or l == NONE or l > i or (l >= 0 and self.cells[l].state != "leaf"):
+                    continue
+                a, b = self.leaves[cell.leaf], self.leaves[-2 - l if l < 0 else self.cells[l].leaf]
+                if all(x.plane is not None and x.block < 0 and x.count >= 6 for x in (a, b)):
+                    self.joints.append((a, b, face))
 
     def link_children(self, axis):
         for cell in self.cells:
@@ -375,21 +387,61 @@ def clipped(polygon, c, gu, gv):
     return r[:12]
 
 
-FACE = [(-HALF, -HALF), (HALF, -HALF), (HALF, HALF), (-HALF, HALF)]
+OVERLAP = 12  # units
 
 
-def polygon_of(plane, shape):
-    half, reach, p = half_side(shape[plane.axis]), abs(plane.a) + abs(plane.b), list(FACE)
-    if plane.h + reach > half:
-        p = clipped(p, plane.h - half, plane.a, plane.b)
-    if -plane.h + reach > half:
-        p = clipped(p, -plane.h - half, -plane.a, -plane.b)
+class Outline:
+    """10.1: how far a tile's points reach, and the borders at which its surface goes on."""
+
+    def __init__(self, fitted=False, end=None, borders=0):
+        self.fitted, self.end, self.borders = fitted, end, borders
+
+    def goes_on(self, axis, upper):
+        return self.borders >> 2 * axis + upper & 1
+
+    def room(self, at, shape, wide=None):
+        """(begin, end) per axis in units from a cell's corner; with the overlap across axis `wide`."""
+        begin, end = [0] * 3, [1 << s for s in shape]
+        if self.fitted:
+            end = [min(e, max(1, self.end[d] - at[d])) for d, e in enumerate(end)]
+        if wide is not None:
+            end[wide] += OVERLAP * (at[wide] + end[wide] == self.end[wide] and self.goes_on(wide, 1))
+            begin[wide] -= OVERLAP * (at[wide] == 0 and self.goes_on(wide, 0))
+        return begin, end
+
+
+def whole_room(shape):
+    return [0] * 3, [1 << s for s in shape]
+
+
+def rectangle_of(room, shape, axis):
+    (u0, v0), (u1, v1) = ([(x[d] << 16 >> shape[d]) - HALF for d in ((axis + 1) % 3, (axis + 2) % 3)] for x in room)
+    return [(u0, v0), (u1, v0), (u1, v1), (u0, v1)]
+
+
+def limits(plane, shape, room):
+    half, k = half_side(shape[plane.axis]), plane.axis
+    return half - room[0][k] * HEIGHT, room[1][k] * HEIGHT - half
+
+
+def polygon_of(plane, shape, room):
+    half, reach = half_side(shape[plane.axis]), abs(plane.a) + abs(plane.b)
+    if abs(plane.h) > half + reach:
+        return []
+    bottom, top = limits(plane, shape, room)
+    p = rectangle_of(room, shape, plane.axis)
+    if plane.h + reach > top:
+        p = clipped(p, plane.h - top, plane.a, plane.b)
+    if -plane.h + reach > bottom:
+        p = clipped(p, -plane.h - bottom, -plane.a, -plane.b)
     return p
 
 
-def is_whole(plane, shape):
-    """Whether no face of the cell cuts the plane: its polygon is treated as a rectangle."""
-    return abs(plane.h) + abs(plane.a) + abs(plane.b) <= half_side(shape[plane.axis])
+def is_whole(plane, shape, room):
+    """Whether nothing along its axis cuts the plane: its polygon is treated as a rectangle."""
+    bottom, top = limits(plane, shape, room)
+    reach = abs(plane.a) + abs(plane.b)
+    return plane.h + reach <= top and -plane.h + reach <= bottom
 
 
 def cut(polygon, wedge):
@@ -402,14 +454,14 @@ def twice_area(polygon):
     return sum(p[0] * q[1] - p[1] * q[0] for p, q in edges(polygon))
 
 
-def lower_share(plane, shape, split):
-    p = polygon_of(plane, shape)
+def lower_share(plane, shape, room, split):
+    p = polygon_of(plane, shape, room)
     area = twice_area(p)
     if len(p) < 3 or area < 256:
         return -1
     if split == plane.axis:
         p = clipped(p, plane.h, plane.a, plane.b)
-    elif is_whole(plane, shape):
+    elif is_whole(plane, shape, room) and room[1][split] == 1 << shape[split]:
         return 128
     else:
         first = split == (plane.axis + 1) % 3
@@ -417,15 +469,30 @@ def lower_share(plane, shape, split):
     return clamp(div(twice_area(p), area >> 8), 0, 256)
 
 
-def spread_rectangle(low, high, w, count, out):
+def density(tilt, d, x, y):
+    """At x along axis d of (u, v), y along the other."""
+    return max((256 << 15) + tilt[d] * x + tilt[1 - d] * y, 32 << 15)
+
+
+def tilted_share(lower, count, r0, r1):
+    even = (lower << 16) // count
+    return even + div((even * (65536 - even) >> 16) * (r1 - r0), r1 + r0)
+
+
+def spread_rectangle(low, high, w, tilt, count, out):
     if count == 1:
         out.append((low[0] + high[0] >> 1, low[1] + high[1] >> 1))
         return
     lower = count // 2
     d = 0 if w[0] * (high[0] - low[0]) >= w[1] * (high[1] - low[1]) else 1
-    middle = low[d] + (high[d] - low[d]) * lower // count
-    spread_rectangle(low, (middle, high[1]) if d == 0 else (high[0], middle), w, lower, out)
-    spread_rectangle((middle, low[1]) if d == 0 else (low[0], middle), high, w, count - lower, out)
+    length, y = high[d] - low[d], low[1 - d] + high[1 - d] >> 1
+    if tilt == (0, 0):
+        middle = low[d] + div(length * lower, count)
+    else:
+        share = tilted_share(lower, count, density(tilt, d, low[d], y), density(tilt, d, high[d], y))
+        middle = low[d] + (length * share >> 16)
+    spread_rectangle(low, (middle, high[1]) if d == 0 else (high[0], middle), w, tilt, lower, out)
+    spread_rectangle((middle, low[1]) if d == 0 else (low[0], middle), high, w, tilt, count - lower, out)
 
 
 def centroid(p):
@@ -452,10 +519,14 @@ def width_at(p, d, x):
     return max(0, max(ys) - min(ys)) if ys else 0
 
 
-def cut_position(p, d, lower, count):
+def cut_position(p, d, tilt, lower, count):
     stops = sorted(x[d] for x in p)
     total = twice_area(p)
-    goal = div(total, count) * lower + div((total - div(total, count) * count) * lower, count)
+    if tilt == (0, 0):
+        goal = div(total, count) * lower + div((total - div(total, count) * count) * lower, count)
+    else:
+        y = div(sum(x[1 - d] for x in p), len(p))
+        goal = total * tilted_share(lower, count, density(tilt, d, stops[0], y), density(tilt, d, stops[-1], y)) >> 16
     w0 = width_at(p, d, stops[0])
     for x0, x1 in zip(stops, stops[1:]):
         length = x1 - x0
@@ -491,30 +562,176 @@ def part(p, d, at, sign):
     return r[:12]
 
 
-def spread_polygon(p, w, count, out):
+def spread_polygon(p, w, tilt, count, out):
     if count == 1:
         out.append(centroid(p))
         return
     sides = [max(x[d] for x in p) - min(x[d] for x in p) for d in (0, 1)]
     d = 0 if w[0] * sides[0] >= w[1] * sides[1] else 1
     lower = count // 2
-    at = cut_position(p, d, lower, count)
+    at = cut_position(p, d, tilt, lower, count)
     for sign, n in ((1, lower), (-1, count - lower)):
         piece = part(p, d, at, sign)
-        spread_polygon(piece if len(piece) >= 3 else p, w, n, out)
+        spread_polygon(piece if len(piece) >= 3 else p, w, tilt, n, out)
 
 
-def spread(p, whole, plane, shape, count):
+def spread(p, whole, plane, shape, tilt, count):
     def stretch(flat, rise):
         return max(flat, abs(rise)) + min(flat, abs(rise)) * 3 // 8
 
     u, v, out = (plane.axis + 1) % 3, (plane.axis + 2) % 3, []
     w = stretch(half_side(shape[u]), plane.a), stretch(half_side(shape[v]), plane.b)
     if count > 0 and whole:
-        spread_rectangle(p[0], p[2], w, count, out)
+        spread_rectangle(p[0], p[2], w, tilt, count, out)
     elif count > 0:
-        spread_polygon(p, w, count, out)
+        spread_polygon(p, w, tilt, count, out)
     return out
+
+
+# --- 10.5 Leaves beside each other --------------------------------------------------------------------------------
+
+STEP = 32 * HEIGHT
+
+
+class Seam:
+    def __init__(self):
+        self.bridges, self.beyond, self.tilt = {}, {}, (0, 0)
+
+
+def seam_of(leaf):
+    leaf.seam = leaf.seam or Seam()
+    return leaf.seam
+
+
+def rise(plane, x):
+    return plane[0] + (plane[1] * x[0] + plane[2] * x[1] >> 15)
+
+
+def on_face(axis, face, x):
+    at = HALF if face % 2 else -HALF
+    return (at, x[1]) if face // 2 == (axis + 1) % 3 else (x[0], at)
+
+
+def bridge(leaf, other, face, alone, outline):
+    p, k = leaf.plane, leaf.plane.axis
+    there = turned(seen_from(other.plane, other.at, other.shape, leaf.at, leaf.shape), k, leaf.shape)
+    if there is None:
+        return
+    d = there.h - p.h, there.a - p.a, there.b - p.b
+    if face // 2 == k:
+        half, edge = half_side(leaf.shape[k]), []
+        for x in polygon_of(p, leaf.shape, outline.room(leaf.at, leaf.shape)):
+            z = rise((p.h, p.a, p.b), x)
+            if (half - z if face % 2 else half + z) <= (abs(p.a) + abs(p.b) >> 14) + 2:
+                edge.append(abs(rise(d, x)))
+        meets = len(edge) >= 2 and max(edge) <= min(STEP // 2, max(abs(p.a), abs(p.b)) // 2)
+    else:
+        meets = all(abs(rise(d, on_face(k, face, (e, e)))) <= STEP for e in (-HALF, HALF))
+    if meets:
+        seam_of(leaf).bridges[face] = d if alone else tuple(x >> 1 for x in d)
+
+
+def area_of(leaf, outline):
+    p = polygon_of(leaf.plane, leaf.shape, outline.room(leaf.at, leaf.shape))
+    if len(p) >= 3 and leaf.wedge is not None:
+        p = cut(p, leaf.wedge)
+    u, v = (leaf.plane.axis + 1) % 3, (leaf.plane.axis + 2) % 3
+    if len(p) < 3 or twice_area(p) <= 0:
+        return 0
+    a, b = (min(65535, abs(div(x * 256, half_side(leaf.shape[d])))) for x, d in ((leaf.plane.a, u), (leaf.plane.b, v)))
+    steep = max(a, b) + min(a, b) * 3 // 8
+    stretch = max(steep, 256) + min(steep, 256) * 3 // 8
+    return max(1, (twice_area(p) << leaf.shape[u] + leaf.shape[v] >> 33) * stretch >> 8)
+
+
+def rise_to(leaf, beyond, axis, outline):
+    area, there_area = area_of(leaf, outline), min(1 << 60, sum(area_of(x, outline) for x in beyond))
+    if area == 0 or there_area == 0:
+        return None
+    points = sum(x.count for x in beyond)
+    count_bits = max(0, max(points, leaf.count).bit_length() - 24)
+    area_bits = max(0, max(area, there_area).bit_length() - 28)
+    there = (points >> count_bits) * (area >> area_bits)
+    here = (leaf.count >> count_bits) * (there_area >> area_bits)
+    if there + here <= 0:
+        return None
+    distance = 16 + ((sum(1 << x.shape[axis] for x in beyond) // len(beyond)) << 4 >> leaf.shape[axis])
+    return div(div(there - here, max(1, there + here >> 9)) * 16, distance)
+
+
+def tilt_along(leaf, axis, outline):
+    low, high = (rise_to(leaf, leaf.seam.beyond[2 * axis + f], axis, outline) if 2 * axis + f in leaf.seam.beyond else None
+                 for f in (0, 1))
+    low = None if low is None else -low
+    if low is None or high is None:
+        tilt = (low or 0) + (high or 0)
+    elif (low < 0) != (high < 0):
+        tilt = 0
+    else:
+        tilt = min(abs(low + high) // 2, 2 * min(abs(low), abs(high))) * (-1 if low < 0 else 1)
+    return clamp(tilt, -192, 192)
+
+
+def join(tree):
+    for a, b, face in tree.joints:
+        alike = a.shape == b.shape
+        for leaf, other, f, bends in ((a, b, face, True), (b, a, face ^ 1, alike)):
+            if bends:
+                bridge(leaf, other, f, not alike, tree.outline)
+            if f // 2 != leaf.plane.axis and other.plane.axis == leaf.plane.axis and leaf.count >= 16:
+                seam_of(leaf).beyond.setdefault(f, []).append(other)
+    for leaf in tree.leaves:
+        if leaf.seam is not None:
+            k = leaf.plane.axis
+            leaf.seam.tilt = tuple(tilt_along(leaf, (k + 1 + i) % 3, tree.outline) for i in (0, 1))
+
+
+def bridged(leaf, room, bare):
+    """The polygon with its edges at the faces along the plane's axis where the surfaces meet."""
+    p, k = leaf.plane, leaf.plane.axis
+    low, high = (leaf.seam.bridges.get(2 * k + f) for f in (0, 1))
+    if low is None and high is None:
+        return bare
+    half = half_side(leaf.shape[k])
+    bottom, top = limits(p, leaf.shape, room)
+    r = clipped(rectangle_of(room, leaf.shape, k), p.h - top - (STEP // 2 if high else 0), p.a, p.b)
+    r = clipped(r, -p.h - bottom - (STEP // 2 if low else 0), -p.a, -p.b)
+    if high:
+        r = clipped(r, p.h + high[0] - half, p.a + high[1], p.b + high[2])
+    if low:
+        r = clipped(r, -(p.h + low[0]) - half, -(p.a + low[1]), -(p.b + low[2]))
+    return r if len(r) >= 3 and 2 * twice_area(r) >= twice_area(bare) else bare
+
+
+def height_of(leaf, outline, x):
+    p, k = leaf.plane, leaf.plane.axis
+    half, z = half_side(leaf.shape[k]), rise((p.h, p.a, p.b), x)
+    if not outline.fitted:
+        return clamp(z, -half, half)
+    bent = z
+    for face, b in (leaf.seam.bridges if leaf.seam else {}).items():
+        if face // 2 == k:
+            edge, away, ramp = x, (half - z if face % 2 else half + z), max(abs(p.a), abs(p.b)) // 4
+        else:
+            edge = on_face(k, face, x)
+            away, ramp = abs(edge[0] - x[0]) + abs(edge[1] - x[1]), HALF // 2
+        if away < ramp:
+            bent += div(rise(b, edge) * min(ramp - away, ramp), ramp)
+    return bent
+
+
+def overlapped(leaf, outline, x):
+    x = list(x)
+    for i in (0, 1):
+        d = (leaf.plane.axis + 1 + i) % 3
+        most = OVERLAP << 16 >> leaf.shape[d]
+        low = (leaf.at[d] << 16 >> leaf.shape[d]) + HALF + x[i]
+        high = (outline.end[d] - leaf.at[d] << 16 >> leaf.shape[d]) - HALF - x[i]
+        if outline.goes_on(d, 0) and low < most:
+            x[i] -= most - low
+        if outline.goes_on(d, 1) and high < most:
+            x[i] += most - high
+    return x
 
 
 def noise_offset(noise, i):
@@ -524,22 +741,29 @@ def noise_offset(noise, i):
     return (2 * reverse - 255) << noise + 2
 
 
-def leaf_points(leaf, out):
+def leaf_points(leaf, outline, out):
     center = [(leaf.at[d] << 4) + (1 << leaf.shape[d] + 3) for d in range(3)]
-    polygon, whole = [], False
+    polygon, whole, over = [], False, False
     if leaf.plane is not None:
-        polygon, whole = polygon_of(leaf.plane, leaf.shape), is_whole(leaf.plane, leaf.shape)
+        over = outline.borders != 0 and leaf.count >= 6 and leaf.block < 0
+        room = whole_room(leaf.shape)
+        if leaf.block < 0:
+            room = outline.room(leaf.at, leaf.shape, leaf.plane.axis if over else None)
+        bare, whole = polygon_of(leaf.plane, leaf.shape, room), is_whole(leaf.plane, leaf.shape, room)
+        polygon = bridged(leaf, room, bare) if leaf.seam else bare
+        whole = whole and polygon is bare
     if len(polygon) >= 3 and leaf.wedge is not None:
-        # A wedge that cuts nothing leaves a rectangle a rectangle.
         polygon, whole = cut(polygon, leaf.wedge), False
     if len(polygon) < 3:
         out.extend([center] * leaf.count)
         return
-    k, half = leaf.plane.axis, half_side(leaf.shape[leaf.plane.axis])
+    k = leaf.plane.axis
     u, v = (k + 1) % 3, (k + 2) % 3
-    for i, x in enumerate(spread(polygon, whole, leaf.plane, leaf.shape, leaf.count)):
-        z = clamp(leaf.plane.h + (leaf.plane.a * x[0] + leaf.plane.b * x[1] >> 15), -half, half)
-        z += noise_offset(leaf.noise, i)
+    tilt = leaf.seam.tilt if leaf.seam else (0, 0)
+    for i, x in enumerate(spread(polygon, whole, leaf.plane, leaf.shape, tilt, leaf.count)):
+        if over:
+            x = overlapped(leaf, outline, x)
+        z = height_of(leaf, outline, x) + noise_offset(leaf.noise, i)
         p = list(center)
         p[u] += (x[0] << leaf.shape[u]) + 2048 >> 12
         p[v] += (x[1] << leaf.shape[v]) + 2048 >> 12
@@ -586,7 +810,7 @@ def fit(occupied, at, v):
 
 
 def weight_of(leaf):
-    polygon = polygon_of(leaf.plane, leaf.shape)
+    polygon = polygon_of(leaf.plane, leaf.shape, whole_room(leaf.shape))
     if len(polygon) < 3:
         return 1
     half = half_side(leaf.shape[0])
@@ -618,28 +842,35 @@ def settle_blocks(leaves, blocks, v, others):
 def read_surface(section, count, schema, step):
     r = Reader(section)
     voxel_shift, base = r.uint(1), [r.signed() for _ in range(3)]
-    depth, count_shift, block_bits = r.uint(1), r.uint(1), r.uint(1)
-    tree = Tree(Symbols(r.raw(r.left()), count_shift), block_bits)
+    depth, outline = r.uint(1), Outline()
+    if depth & 128:
+        depth, borders = depth & 127, r.uint(1)
+        outline = Outline(True, [32 * r.varint() for _ in range(3)], borders)
+    count_shift, block_bits = r.uint(1), r.uint(1)
+    tree = Tree(Symbols(r.raw(r.left()), count_shift), block_bits, outline)
     tree.read(count, depth)
+    if outline.fitted:
+        join(tree)
     points = []
     for leaf in tree.leaves:
         if leaf.block < 0:
-            leaf_points(leaf, points)
+            leaf_points(leaf, outline, points)
     if tree.blocks:
         settle_blocks(tree.leaves, tree.blocks, block_bits, points)
     for leaf in tree.leaves:
         if leaf.block >= 0:
-            leaf_points(leaf, points)
+            leaf_points(leaf, outline, points)
     if len(points) != count:
         raise Damaged("other than the announced number of points")
-    points = [[clamp(v, 0, 16 << depth) for v in p] for p in points]
+    most, beside = 16 << depth, 16 * OVERLAP if outline.fitted else 0
+    points = [[clamp(v, -beside, most + beside) for v in p] for p in points]
     voxels = None
     if voxel_shift != 255:
         def key(p):
-            return sum((p[a] >> voxel_shift >> i & 1) << 3 * i + a for i in range(21) for a in range(3))
+            return sum((clamp(p[a], 0, most) >> voxel_shift >> i & 1) << 3 * i + a for i in range(21) for a in range(3))
 
         points.sort(key=key)
-        voxels = [tuple(v >> voxel_shift for v in p) for p in points]
+        voxels = [tuple(clamp(v, 0, most) >> voxel_shift for v in p) for p in points]
     side = step / 512
     xyz = [[schema["origin"][d] + float(16 * base[d] + p[d]) * side for d in range(3)] for p in points]
     if schema["coordinates"] == 1:

@@ -32,14 +32,14 @@ TEST(SurfacePolygon, SpreadGivesExactlyAsManyPointsInsideTheCell) {
   for (int round = 0; round < 3000; ++round) {
     const CellShape shape = random_shape(rng);
     const Plane plane = random_plane(rng, shape);
-    Polygon polygon = polygon_of(plane, shape);
+    Polygon polygon = polygon_of(plane, shape, Room::whole(shape));
     if (rng() % 2 == 0 && polygon.size >= 3) {
       polygon.rectangle = false;
       cut(polygon, {static_cast<std::uint8_t>(rng() % 16), static_cast<std::uint8_t>(rng() % 32)});
     }
     const std::uint32_t count = rng() % 100;
     std::vector<Vertex> points;
-    spread(polygon, plane, shape, count, points);
+    spread(polygon, plane, shape, count, {}, points);
     ASSERT_EQ(points.size(), count);
     for (const Vertex& x : points) {
       ASSERT_LE(std::abs(x.u), kHalf);
@@ -55,7 +55,7 @@ TEST(SurfacePolygon, PiecesHaveEqualAreas) {
   const CellShape shape{10, 10, 10};
   for (const std::uint32_t count : {2u, 4u, 16u, 64u, 256u}) {
     std::vector<Vertex> points;
-    spread(polygon_of({}, shape), {}, shape, count, points);
+    spread(polygon_of({}, shape, Room::whole(shape)), {}, shape, count, {}, points);
     double mean_u = 0, mean_v = 0, second = 0;
     for (const Vertex& x : points) {
       mean_u += x.u / double(kHalf) / count;
@@ -78,7 +78,7 @@ TEST(SurfacePolygon, HalvesOfAWedgeHoldTheirShareOfPoints) {
   triangle.at[1] = {kHalf, -kHalf};
   triangle.at[2] = {-kHalf, kHalf};
   std::vector<Vertex> points;
-  spread(triangle, {}, shape, 1000, points);
+  spread(triangle, {}, shape, 1000, {}, points);
   int near_corner = 0;
   for (const Vertex& x : points) near_corner += x.u < 0 && x.v < 0;
   EXPECT_NEAR(near_corner, 500, 40);  // half of the triangle's area
@@ -86,12 +86,48 @@ TEST(SurfacePolygon, HalvesOfAWedgeHoldTheirShareOfPoints) {
 
 TEST(SurfacePolygon, LowerShareIsThatOfTheArea) {
   const CellShape shape{8, 8, 8};
-  EXPECT_EQ(lower_share({0, 0, 0, 2}, shape, 0), 128);
-  EXPECT_EQ(lower_share({0, 0, 0, 2}, shape, 1), 128);
+  EXPECT_EQ(lower_share({0, 0, 0, 2}, shape, Room::whole(shape), 0), 128);
+  EXPECT_EQ(lower_share({0, 0, 0, 2}, shape, Room::whole(shape), 1), 128);
   const auto half = static_cast<std::int32_t>(half_side(8));
-  EXPECT_EQ(lower_share({-half / 2, 0, 0, 2}, shape, 2), 256);
-  EXPECT_EQ(lower_share({half / 2, 0, 0, 2}, shape, 2), 0);
-  EXPECT_EQ(lower_share({2 * half, 0, 0, 2}, shape, 2), -1);  // misses the cell
+  EXPECT_EQ(lower_share({-half / 2, 0, 0, 2}, shape, Room::whole(shape), 2), 256);
+  EXPECT_EQ(lower_share({half / 2, 0, 0, 2}, shape, Room::whole(shape), 2), 0);
+  EXPECT_EQ(lower_share({2 * half, 0, 0, 2}, shape, Room::whole(shape), 2), -1);  // misses the cell
+}
+
+TEST(SurfacePolygon, ATiltMakesOneSideDenser) {
+  // Density from 1/2 to 3/2 along u: the lower half holds three eighths of the points.
+  const CellShape shape{12, 12, 12};
+  Polygon cut_corner = polygon_of({}, shape, Room::whole(shape));
+  clip(cut_corner, -2 * kHalf, kHalf, kHalf);
+  for (const Polygon& polygon : {polygon_of({}, shape, Room::whole(shape)), cut_corner}) {
+    std::vector<Vertex> points;
+    spread(polygon, {}, shape, 4000, {128, 0}, points);
+    ASSERT_EQ(points.size(), 4000u);
+    std::size_t low_u = 0, low_v = 0;
+    for (const Vertex& x : points) {
+      low_u += x.u < 0;
+      low_v += x.v < 0;
+    }
+    EXPECT_NEAR(double(low_u), 1500, 60);
+    EXPECT_NEAR(double(low_v), 2000, 60);
+  }
+}
+
+TEST(SurfacePolygon, StaysInsideItsRoom) {
+  std::mt19937 rng(2);
+  for (int round = 0; round < 3000; ++round) {
+    const CellShape shape = random_shape(rng);
+    const Plane plane = random_plane(rng, shape);
+    Room room = Room::whole(shape);
+    for (std::int32_t& e : room.end) e = 1 + static_cast<std::int32_t>(rng() % static_cast<unsigned>(e));
+    const Polygon polygon = polygon_of(plane, shape, room);
+    const unsigned u = (plane.axis + 1u) % 3, v = (plane.axis + 2u) % 3;
+    for (int i = 0; i < polygon.size; ++i) {
+      const Vertex& x = polygon.at[static_cast<std::size_t>(i)];
+      EXPECT_LE(x.u, std::int64_t{room.end[u]} * (2 * kHalf) / (1 << shape[u]) - kHalf);
+      EXPECT_LE(x.v, std::int64_t{room.end[v]} * (2 * kHalf) / (1 << shape[v]) - kHalf);
+    }
+  }
 }
 
 }  // namespace
