@@ -19,7 +19,9 @@ constexpr double kRmsAim = 0.992;                                 // of the prom
 constexpr double kCloseEnough = 0.06, kCloseEnoughOnAll = 0.015;  // of the target; the rest is extrapolated
 constexpr int kTriesForNear = 3, kTriesForGood = 6;
 constexpr double kNearRms = 0.98, kLeastRms = 0.95;  // of the promise, where the sample is the whole map
-constexpr double kFinest = 1.0 / (1 << 20);          // of the longest side of a piece
+// Where no step came near to the promise, coarser ones are tried: errors do not grow evenly, either.
+constexpr double kCoarser[] = {1.02, 1.04, 1.07, 1.11, 1.16};
+constexpr double kFinest = 1.0 / (1 << 20);  // of the longest side of a piece
 constexpr double kBitsPerStep =
     1.2;  // by how much the logarithm of the size falls with that of the step, usually
 
@@ -110,6 +112,15 @@ Status RateSearch::seek_on(const TileSample& sample, CodingPlan& plan, const Map
     if (at_end || leapt_ || is_close || is_late) break;
   }
   if (!std::isfinite(smallest.bits)) return {};
+  const double promise = target / kRmsAim, found_step = smallest.step_m;
+  for (const double coarser : kCoarser) {
+    if ((smallest.sum.*value)() >= kNearRms * promise) break;
+    plan.step_m = std::min(coarser * found_step, steps.coarsest);
+    MapSchema with_step = schema;
+    with_step.step_m = plan.step_m;
+    MAPCODEC_ASSIGN(const CodedSum sum, encode_sample(sample, with_step, plan, arena_, stop_, &coded));
+    if ((sum.*value)() <= promise) smallest.take_if_smaller(plan.step_m, sum, std::move(coded));
+  }
   plan.step_m = smallest.step_m;
   found_ = smallest.sum;
   expected_bits_ = smallest.bits;
