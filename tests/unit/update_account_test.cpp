@@ -51,8 +51,9 @@ TEST(RmsAccount, GoesOnFromItsRecord) {
   info.achieved.rms_m = 0.5 * kPromise;
   EXPECT_FALSE(RmsAccount(info, kPromise, 1000).extra());
   info.achieved.rms_m = a.rms_m();
-  for (std::size_t n = 0; n < a.extra()->size(); ++n) {
-    info.extras[kRmsAccountExtra] = Bytes(a.extra()->begin(), a.extra()->begin() + std::ptrdiff_t(n));
+  const Bytes whole = *a.extra();
+  for (std::size_t n = 0; n < whole.size(); ++n) {
+    info.extras[kRmsAccountExtra] = Bytes(whole.begin(), whole.begin() + std::ptrdiff_t(n));
     const RmsAccount c(info, kPromise, 1000);
     EXPECT_TRUE(std::isfinite(c.rms_m()) && c.folding_rms_m() > 0);
   }
