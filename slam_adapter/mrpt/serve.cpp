@@ -61,8 +61,7 @@ Status limit_process(std::uint64_t memory_bytes) {
 #else
   (void)memory_bytes;
 #endif
-  if (!limited)
-    return make_error(ErrorCode::kInvalidArgument, "the reader's memory cannot be limited");
+  if (!limited) return make_error(ErrorCode::kInvalidArgument, "the reader's memory cannot be limited");
   return {};
 }
 
