@@ -30,8 +30,8 @@ std::uint8_t usual_level(const std::vector<const TileRecord*>& tiles) {
   return most == points.end() ? 0 : most->first;
 }
 
-// Stored points that are decoded at the same time, besides those that are known already.
-constexpr std::uint64_t kPointsTogether = 3000000;
+// Stored points that are looked at together: fewer leave threads without work, more take memory.
+constexpr std::uint64_t kPointsTogether = 8000000;
 
 }  // namespace
 

@@ -60,7 +60,7 @@ namespace {
 /// commit needed once would stay with a service that runs for months.
 void give_memory_back() {
   ::mallopt(M_ARENA_MAX, 4);
-  ::mallopt(M_MMAP_THRESHOLD, 1 << 20);
+  ::mallopt(M_MMAP_THRESHOLD, 32 << 20);
 }
 
 }  // namespace
