@@ -10,7 +10,7 @@
 namespace mapcodec {
 namespace {
 
-constexpr std::size_t kMostTiles = 4;
+constexpr std::size_t kMostTiles = 16;
 constexpr std::uint64_t kMostPoints = 400000;  // of all chosen tiles; but one tile in any case
 constexpr std::uint64_t kFewPoints = 10000;    // of a map too small for levels to matter
 constexpr std::size_t kQueries = 2000;

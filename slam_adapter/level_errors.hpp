@@ -30,7 +30,7 @@ struct LevelErrors {
 [[nodiscard]] Result<LevelErrors> read_level_errors(ByteSpan bytes);
 
 /// Keeps the bytes of a few tiles while a map is written, and measures them against their points: at most
-/// four tiles spread evenly over the map, and but one where they are large; in each direction about 2,000
+/// sixteen tiles spread evenly over the map, and but one where they are large; in each direction about 2,000
 /// points of a tile, against all of the other side.
 class LevelSampler {
  public:
