@@ -22,11 +22,14 @@ struct UnitTile {
   surface::Header header;
 };
 
-Status check(std::span<const Vec3> xyz, const Quantizer& lattice) {
+Status check(std::span<const Vec3> xyz, const Quantizer& lattice, const SurfaceTrade& trade) {
   if (xyz.empty()) return make_error(ErrorCode::kEmpty, "no points to encode");
   if (!(lattice.step_m > 0) || !std::isfinite(lattice.step_m) || !is_finite(lattice.origin)) {
     return make_error(ErrorCode::kInvalidArgument, "surface step or origin is not a proper number");
   }
+  const bool fair = trade.bit_price > 0 && std::isfinite(trade.bit_price) && trade.forward_weight > 0 &&
+                    trade.forward_weight < 1;
+  if (!fair) return make_error(ErrorCode::kInvalidArgument, "bit price or weight out of range");
   if (xyz.size() > std::numeric_limits<std::uint32_t>::max() / 2) {
     return make_error(ErrorCode::kInvalidArgument, "too many points in one tile");
   }
@@ -126,14 +129,15 @@ void set_up(surface::Models& models, const surface::Header& header) {
 }
 
 /// Chooses and writes; a second pass knows what symbols cost from the first.
-Bytes code_tree(UnitTile& tile, Effort effort, std::vector<surface::SubUnits>& points) {
-  const int passes = effort == Effort::high ? 2 : 1;
+Bytes code_tree(UnitTile& tile, const SurfaceSettings& settings, std::vector<surface::SubUnits>& points) {
+  const int passes = settings.effort == Effort::high ? 2 : 1;
   tile.header.count_shift = kCoarseCounts;
   tile.header.block_bits = tile.header.depth > surface::kBlockBits ? surface::kBlockBits : std::uint8_t{0};
   auto models = std::make_unique<surface::Models>();
   for (int pass = 1;; ++pass) {
     set_up(*models, tile.header);
-    const std::vector<surface::Choice> choices = choose_cells(tile.points, tile.header.depth, *models, {});
+    const std::vector<surface::Choice> choices =
+        choose_cells(tile.points, tile.header.depth, *models, settings.trade);
     if (tile.points.size() < kManyPoints * count_leaves(choices))
       tile.header.count_shift = surface::kExactCounts;
     SymbolWriter side;
@@ -154,10 +158,10 @@ Bytes code_tree(UnitTile& tile, Effort effort, std::vector<surface::SubUnits>& p
 
 Result<SurfaceEncoding> encode_surface(std::span<const Vec3> xyz, const Quantizer& lattice,
                                        const SurfaceSettings& settings) {
-  MAPCODEC_TRY(check(xyz, lattice));
+  MAPCODEC_TRY(check(xyz, lattice, settings.trade));
   MAPCODEC_ASSIGN(UnitTile tile, to_units(xyz, lattice, settings.borders));
   SurfaceEncoding e;
-  const Bytes code = code_tree(tile, settings.effort, e.points);
+  const Bytes code = code_tree(tile, settings, e.points);
   e.header = tile.header;
   ByteWriter out;
   surface::write_header(out, e.header);

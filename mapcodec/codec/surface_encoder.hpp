@@ -18,6 +18,7 @@ namespace mapcodec {
 struct SurfaceSettings {
   Effort effort = Effort::standard;
   TileBorders borders;
+  SurfaceTrade trade;
 };
 
 /// A tile's bytes and what its decoder will make of them.
@@ -32,7 +33,8 @@ struct SurfaceEncoding {
 /// without channels that is how they are decoded.
 /// @param xyz      points [m, map frame]; not empty, all within 2^21 / 32 steps of each other per axis.
 /// @param lattice  step_m: the surface step. The error follows it: the RMS is about half to twice the step.
-/// Errors: Empty; InvalidArgument (step not positive, non-finite or too distant points).
+/// Errors: Empty; InvalidArgument (step or bit price not positive, weight not between 0 and 1, non-finite or
+/// too distant points).
 [[nodiscard]] Result<SurfaceEncoding> encode_surface(std::span<const Vec3> xyz, const Quantizer& lattice,
                                                      const SurfaceSettings& settings);
 

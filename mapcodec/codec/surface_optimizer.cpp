@@ -45,11 +45,11 @@ class Luck {
 
 class Optimizer {
  public:
-  Optimizer(std::span<const Units> points, unsigned depth, Models& models, const OptimizerSettings& settings)
+  Optimizer(std::span<const Units> points, unsigned depth, Models& models, const SurfaceTrade& trade)
       : points_(points),
         depth_(depth),
-        forward_(settings.forward_weight),
-        lambda_(settings.lambda_steps * kStep2),
+        forward_(trade.forward_weight),
+        lambda_(trade.bit_price * kStep2),
         prices_(models),
         errors_(points, depth, models.outline) {
     if (models.voxel_bits > 0) voxels_ = VoxelErrors(points, models.voxel_bits, forward_, lambda_);
@@ -469,8 +469,8 @@ class Optimizer {
 }  // namespace
 
 std::vector<Choice> choose_cells(std::span<const Units> points, unsigned depth, Models& models,
-                                 const OptimizerSettings& settings) {
-  return Optimizer(points, depth, models, settings).run();
+                                 const SurfaceTrade& trade) {
+  return Optimizer(points, depth, models, trade).run();
 }
 
 }  // namespace mapcodec::surface

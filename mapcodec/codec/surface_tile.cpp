@@ -66,6 +66,7 @@ Channel on_decoded(const ChannelSchema& channel, const Channel& original, const 
 struct TileMemo::Content {
   double step_m = 0;
   Effort effort = Effort::standard;
+  SurfaceTrade trade;
   SurfaceEncoding encoding;
   std::uint8_t no_voxels = 0;  ///< its voxel shift without channels
   NearestPair near;            ///< empty where errors were only estimated
@@ -141,8 +142,10 @@ Result<std::unique_ptr<Content>> code_positions(const PointCloud& tile, const Ma
   auto c = std::make_unique<Content>();
   c->step_m = step_m;
   c->effort = settings.effort;
+  c->trade = settings.trade;
   const Quantizer lattice{schema.origin, step_m, schema.coordinates.kind};
-  MAPCODEC_ASSIGN(c->encoding, encode_surface(tile.xyz, lattice, {settings.effort, settings.borders}));
+  MAPCODEC_ASSIGN(c->encoding,
+                  encode_surface(tile.xyz, lattice, {settings.effort, settings.borders, settings.trade}));
   c->no_voxels = c->encoding.header.voxel_shift;
   SurfaceTile& r = c->figures;
   const std::vector<Vec3>& decoded = c->encoding.decoded;
@@ -180,7 +183,7 @@ Result<SurfaceTile> encode_surface_tile(const PointCloud& tile, const MapSchema&
   std::unique_ptr<Content> own;
   Content* coded = memo == nullptr ? nullptr : memo->content.get();
   const bool known = coded != nullptr && coded->step_m == step_m && coded->effort == settings.effort &&
-                     coded->encoding.points.size() == tile.size();
+                     coded->trade == settings.trade && coded->encoding.points.size() == tile.size();
   if (!known) {
     MAPCODEC_ASSIGN(own, code_positions(tile, schema, step_m, settings));
     coded = own.get();

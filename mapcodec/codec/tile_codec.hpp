@@ -55,6 +55,16 @@ struct PaperSettings {
 
 class TileMemo;
 
+/// What a surface encoder weighs against each other. No decoder needs to know it.
+struct SurfaceTrade {
+  /// Squared error [steps^2], summed over points, that one bit has to save. With less the step is larger at
+  /// the same error: more cells, and planes that are told less exactly.
+  double bit_price = 1;
+  /// Of the squared distances from original to decoded points; the rest is of those back.
+  double forward_weight = 0.3;
+  bool operator==(const SurfaceTrade&) const = default;
+};
+
 struct TileSettings {
   CodecId codec = CodecId::points;
   Effort effort = Effort::standard;
@@ -66,6 +76,7 @@ struct TileSettings {
   /// points, surface: for searches. Where no channel is coded, the RMS is measured on a part of the points
   /// (within about 1 %), and neither the largest nor the density error is.
   bool rough_errors = false;
+  SurfaceTrade trade;
   TileBorders borders;  ///< surface: where nothing is known of other tiles, its surface ends with its points
   PaperSettings paper;
 };

@@ -2,6 +2,8 @@
 // The surface codec as a whole: what goes in comes out in number, near where it was, the same every time.
 #include <gtest/gtest.h>
 
+#include "mapcodec/quality/grid_nearest.hpp"
+
 #include "mapcodec/codec/tile_codec.hpp"
 #include "mapcodec/quality/evaluation.hpp"
 #include "tests/unit/surface_support.hpp"
@@ -73,6 +75,36 @@ TEST(SurfaceCodec, RefusesWhatHasNoSurface) {
   const Cloud one{{0, 0, 0}};
   for (const double step : {0.0, -1.0, std::nan("")}) {
     EXPECT_EQ(encode_surface(one, steps_of(step), {}).error().code, ErrorCode::kInvalidArgument);
+  }
+}
+
+TEST(SurfaceCodec, RefusesATradeOutOfRange) {
+  const Cloud one{{0, 0, 0}};
+  for (const SurfaceTrade& trade :
+       {SurfaceTrade{0, 0.3}, SurfaceTrade{-1, 0.3}, SurfaceTrade{std::nan(""), 0.3}, SurfaceTrade{1, 0},
+        SurfaceTrade{1, 1}, SurfaceTrade{1, std::nan("")}}) {
+    EXPECT_EQ(encode_surface(one, steps_of(0.01), {Effort::standard, {}, trade}).error().code,
+              ErrorCode::kInvalidArgument);
+  }
+}
+
+TEST(SurfaceCodec, LowerPricesBuyLessError) {
+  const Cloud cloud = room(20000, 3, 5);
+  std::size_t last_bytes = 0;
+  double last_error = 1e9;
+  for (const double price : {4.0, 1.0, 0.25}) {
+    const auto e = encode_surface(cloud, steps_of(0.02), {Effort::standard, {}, {price, 0.3}});
+    ASSERT_TRUE(e.ok());
+    EXPECT_EQ(decode_surface(e->bytes, cloud.size(), steps_of(0.02), {})->xyz, e->decoded);
+    const NearestPair near = find_nearest_pair(cloud, e->decoded);
+    double error = 0;
+    for (const Nearest* n : {&near.forth, &near.back}) {
+      for (const double s : n->squared) error += s;
+    }
+    EXPECT_GT(e->bytes.size(), last_bytes);
+    EXPECT_LT(error, last_error);
+    last_bytes = e->bytes.size();
+    last_error = error;
   }
 }
 

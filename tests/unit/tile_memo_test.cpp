@@ -52,6 +52,17 @@ TEST(TileMemo, GivesTheSameBytes) {
   }
 }
 
+TEST(TileMemo, IsNotForAnotherTrade) {
+  Colored c = colored_room();
+  TileMemo memo;
+  ASSERT_TRUE(encode_tile(c.cloud, c.schema, c.settings, &memo).ok());
+  c.settings.trade = {0.4, 0.5};
+  const auto anew = encode_tile(c.cloud, c.schema, c.settings);
+  const auto remembered = encode_tile(c.cloud, c.schema, c.settings, &memo);
+  ASSERT_TRUE(anew.ok() && remembered.ok());
+  EXPECT_EQ(anew->bytes, remembered->bytes);
+}
+
 TEST(TileMemo, PositionsFirstAreTheSamePositions) {
   Colored c = colored_room();
   MapSchema positions = c.schema;
