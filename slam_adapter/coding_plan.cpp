@@ -17,9 +17,9 @@ double geometry_bits(const EncodedTile& t) {
   return 8 * static_cast<double>(t.geometry_bytes);
 }
 
-double cost(const EncodedTile& t, double step_m) {
+double cost(const EncodedTile& t, double bit_price_m2) {
   const double error = (squares(t, t.rms_forward_m) + squares(t, t.rms_backward_m)) / 2;
-  return error + step_m * step_m * geometry_bits(t);
+  return error + bit_price_m2 * geometry_bits(t);
 }
 
 Result<EncodedTile> encode_as(CodecId codec, double step_m, const PointCloud& tile, const MapSchema& schema,
@@ -32,7 +32,8 @@ Result<EncodedTile> encode_as(CodecId codec, double step_m, const PointCloud& ti
 
 Result<EncodedTile> encode_cheapest(const PointCloud& tile, const MapSchema& schema, const CodingPlan& plan,
                                     TileMemo* memo) {
-  const double voxel_m = plan.voxel_steps * plan.step_m;
+  const double price_m2 = plan.tiles.trade.bit_price * plan.step_m * plan.step_m;
+  const double voxel_m = plan.voxel_steps * std::sqrt(price_m2);
   if (plan.fixed) {
     return encode_as(*plan.fixed, plan.fixed == CodecId::surface ? plan.step_m : voxel_m, tile, schema, plan,
                      memo);
@@ -42,7 +43,7 @@ Result<EncodedTile> encode_cheapest(const PointCloud& tile, const MapSchema& sch
   if (!surface.ok()) return encode_as(CodecId::points, voxel_m, tile, schema, plan);
   if (geometry_bits(*surface) < kClearlySurface * static_cast<double>(tile.size())) return surface;
   const auto points = encode_as(CodecId::points, voxel_m, tile, positions_alone(schema), plan);
-  if (!points.ok() || cost(*surface, plan.step_m) <= cost(*points, plan.step_m)) return surface;
+  if (!points.ok() || cost(*surface, price_m2) <= cost(*points, price_m2)) return surface;
   return encode_as(CodecId::points, voxel_m, tile, schema, plan);
 }
 

@@ -12,13 +12,13 @@ namespace mapcodec {
 enum class CodecChoice : std::uint8_t { cheapest, surface, points };
 
 /// What all tiles are coded with. Under `cheapest` one Lagrangian decides for each tile: its mean squared
-/// error of both directions plus step_m^2 per bit, of positions alone.
+/// error of both directions plus what a bit has to save, of positions alone.
 struct CodingPlan {
   CodecChoice choice = CodecChoice::points;
   TileSettings tiles;  ///< what is neither step nor choice; tiles.codec is used by `points`
   double step_m = 0;   ///< surface step, or voxel side where the choice is `points`; 0: the codec has none
   std::optional<CodecId> fixed;  ///< the choice is made: surface or points, with the steps of a mixture
-  double voxel_steps = 2.7;      ///< voxel side of `points` tiles among surfaces, in surface steps
+  double voxel_steps = 2.7;  ///< voxel side of `points` tiles among surfaces, in surface steps (of price 1)
 
   [[nodiscard]] bool has_surfaces() const { return choice != CodecChoice::points; }
 };
@@ -38,6 +38,8 @@ class CodedSum {
   [[nodiscard]] double rms_m() const {
     return points_ == 0 ? 0 : std::sqrt(std::max(forward_, backward_) / points_);
   }
+  /// The original points' RMS distance over that of the decoded ones.
+  [[nodiscard]] double forward_to_backward() const { return std::sqrt(forward_ / backward_); }
   [[nodiscard]] TileErrors errors() const;
   /// Colour error that the positions allow at least, about.
   [[nodiscard]] double least_color_error() const { return points_ == 0 ? 0 : least_color_ / points_; }

@@ -38,9 +38,14 @@ std::optional<std::size_t> bounded_color(const MapSchema& schema) {
 /// The choice on one sample.
 class Chooser {
  public:
-  Chooser(const CompressOptions& options, const TileSample& sample, MapSchema& schema, Arena& arena,
-          std::vector<std::string>& warnings)
-      : options_(options), sample_(sample), schema_(schema), arena_(arena), warnings_(warnings) {
+  Chooser(const CompressOptions& options, const TileSample& sample, const TileSample& large,
+          MapSchema& schema, Arena& arena, std::vector<std::string>& warnings)
+      : options_(options),
+        sample_(sample),
+        large_(large),
+        schema_(schema),
+        arena_(arena),
+        warnings_(warnings) {
     choice_.plan.choice = CodecChoice::points;
     choice_.plan.step_m = schema.step_m;
     choice_.plan.tiles.codec = codec_of(options.promise);
@@ -64,7 +69,9 @@ class Chooser {
     plan.choice = codecs;
     return plan;
   }
-  RateSearch search(const MapSchema& schema) const { return {sample_, schema, arena_, options_.stop}; }
+  RateSearch search(const MapSchema& schema) const {
+    return {sample_, large_, schema, arena_, options_.stop};
+  }
 
   Status choose_for_rms() {
     const CodecChoice allowed = allowed_codecs(options_);
@@ -87,10 +94,13 @@ class Chooser {
   /// The fewest bits of the mixture and either codec alone: a mixture cannot come between the two where a
   /// tile that changes over takes much of the map with it. Nothing if that is `points`.
   Result<std::optional<Found>> best_for_rms(CodecChoice allowed, double rms_m) {
+    // One tile has no mixture: what it loses would leap from one codec to the other.
+    const bool alone = sample_.whole && sample_.pieces.size() == 1;
     Found mixed{{}, search(schema_)};
-    MAPCODEC_ASSIGN(mixed.plan, mixed.search.for_rms(plan_with(allowed), rms_m));
+    MAPCODEC_ASSIGN(mixed.plan,
+                    mixed.search.for_rms(plan_with(alone ? CodecChoice::surface : allowed), rms_m));
     const double share = mixed.search.found().surface_share();
-    const bool clear = share == 1 && !mixed.search.leapt();
+    const bool clear = alone || (share == 1 && !mixed.search.leapt());
     if (allowed == CodecChoice::surface || (clear && mixed.search.expected_bits() < 0.5))
       return std::optional(mixed);
     MAPCODEC_ASSIGN(const CodedSum points, mixed.search.measure(choice_.plan));
@@ -111,7 +121,7 @@ class Chooser {
       }
       consider(surface);
     }
-    if (share > 0 && !(mixed.search.leapt() && sample_.pieces.size() == 1)) consider(mixed);
+    if (share > 0 && !(mixed.search.leapt() && sample_.pieces.size() == 1 && !alone)) consider(mixed);
     return best;
   }
 
@@ -183,7 +193,7 @@ class Chooser {
   }
 
   const CompressOptions& options_;
-  const TileSample& sample_;
+  const TileSample &sample_, &large_;
   MapSchema& schema_;
   Arena& arena_;
   std::vector<std::string>& warnings_;
@@ -198,12 +208,15 @@ CodecChoice allowed_codecs(const CompressOptions& options) {
 
 Result<PlanChoice> choose_plan(const CompressOptions& options, const TileSet& tiles, MapSchema& schema,
                                Arena& arena, std::vector<std::string>& warnings) {
-  TileSample sample;
+  TileSample sample, large;
   // Without a lattice there is nothing to choose.
   if (options.promise == PromiseKind::rms || options.promise == PromiseKind::max_error) {
     MAPCODEC_ASSIGN(sample, take_sample(tiles, schema, arena));
   }
-  return Chooser(options, sample, schema, arena, warnings).choose();
+  if (!sample.whole && allowed_codecs(options) != CodecChoice::points) {
+    MAPCODEC_ASSIGN(large, take_large_sample(tiles, schema, arena));
+  }
+  return Chooser(options, sample, large, schema, arena, warnings).choose();
 }
 
 double target_bits(const CompressOptions& options, const MapSchema& schema) {

@@ -9,6 +9,8 @@
 #include "mapcodec/geometry/quantizer.hpp"
 #include "parallel/runner.hpp"
 #include "slam_adapter/log_secant.hpp"
+#include "slam_adapter/trade_search.hpp"
+#include "slam_adapter/whole_search.hpp"
 
 namespace mapcodec {
 namespace {
@@ -17,11 +19,7 @@ constexpr int kMostTries = 12;
 constexpr std::size_t kFewPoints = 60000;                         // for the first tries
 constexpr double kRmsAim = 0.992;                                 // of the promise
 constexpr double kCloseEnough = 0.06, kCloseEnoughOnAll = 0.015;  // of the target; the rest is extrapolated
-constexpr int kTriesForNear = 3, kTriesForGood = 6;
-constexpr double kNearRms = 0.98, kLeastRms = 0.95;  // of the promise, where the sample is the whole map
-// Where no step came near to the promise, coarser ones are tried: errors do not grow evenly, either.
-constexpr double kCoarser[] = {1.02, 1.04, 1.07, 1.11, 1.16};
-constexpr double kFinest = 1.0 / (1 << 20);  // of the longest side of a piece
+constexpr double kFinest = 1.0 / (1 << 20);                       // of the longest side of a piece
 constexpr double kBitsPerStep =
     1.2;  // by how much the logarithm of the size falls with that of the step, usually
 
@@ -55,21 +53,6 @@ Result<double> color_floor_at(double step_m, std::size_t channel, const TileSamp
   });
 }
 
-/// The smallest coding that keeps the promise: sizes do not fall evenly with the step.
-struct Kept {
-  double step_m = 0, bits = INFINITY;
-  CodedSum sum;
-  CodedTiles coded;
-
-  void take_if_smaller(double step, const CodedSum& s, CodedTiles&& tiles) {
-    if (s.geometry_bits_per_point() >= bits) return;
-    step_m = step;
-    bits = s.geometry_bits_per_point();
-    sum = s;
-    coded = std::move(tiles);
-  }
-};
-
 }  // namespace
 
 Result<CodedSum> RateSearch::measure(const CodingPlan& plan) const {
@@ -81,23 +64,15 @@ Status RateSearch::seek_on(const TileSample& sample, CodingPlan& plan, const Map
   LogSecant secant(target, slope);
   // A small map is its own sample: being close there is being close.
   const double close = sample.whole ? kCloseEnoughOnAll : kCloseEnough;
-  const bool for_good = sample.whole && value == &CodedSum::rms_m;
-  CodedTiles coded;
-  Kept smallest;
-  coded_.reset();
+  CodingPlan trial = plan;
+  trial.tiles.rough_errors = true;
   for (int i = 0; i < kMostTries; ++i) {
-    CodingPlan trial = plan;
-    trial.tiles.rough_errors = !for_good;
+    trial.step_m = plan.step_m;
     MapSchema with_step = schema;
     with_step.step_m = plan.step_m;
-    MAPCODEC_ASSIGN(found_, encode_sample(sample, with_step, trial, arena_, stop_, &coded));
+    MAPCODEC_ASSIGN(found_, encode_sample(sample, with_step, trial, arena_, stop_));
     surfaces_alone_ = surfaces_alone_ && found_.surface_share() == 1;
     const double got = (found_.*value)();
-    if (for_good && got <= target / kRmsAim) smallest.take_if_smaller(plan.step_m, found_, std::move(coded));
-    if (for_good && is_kept(i, got / target)) {
-      leapt_ = false;
-      break;
-    }
     const double next = std::clamp(secant.next(plan.step_m, got), steps.finest, steps.coarsest);
     slope = secant.slope();
     const double bits = found_.geometry_bits_per_point();
@@ -106,42 +81,51 @@ Status RateSearch::seek_on(const TileSample& sample, CodingPlan& plan, const Map
     plan.step_m = next;
     // The last stretch needs no try: the slope is known.
     leapt_ = secant.is_leap();
-    // On the whole map itself being close is no end: what is found here is found for good.
-    const bool is_close = std::abs(got / target - 1) <= close && !for_good;
-    const bool is_late = i + 1 >= kTriesForGood && std::isfinite(smallest.bits);
-    if (at_end || leapt_ || is_close || is_late) break;
+    if (at_end || leapt_ || std::abs(got / target - 1) <= close) break;
   }
-  if (!std::isfinite(smallest.bits)) return {};
-  const double promise = target / kRmsAim, found_step = smallest.step_m;
-  for (const double coarser : kCoarser) {
-    if ((smallest.sum.*value)() >= kNearRms * promise) break;
-    plan.step_m = std::min(coarser * found_step, steps.coarsest);
-    MapSchema with_step = schema;
-    with_step.step_m = plan.step_m;
-    MAPCODEC_ASSIGN(const CodedSum sum, encode_sample(sample, with_step, plan, arena_, stop_, &coded));
-    if ((sum.*value)() <= promise) smallest.take_if_smaller(plan.step_m, sum, std::move(coded));
-  }
-  plan.step_m = smallest.step_m;
-  found_ = smallest.sum;
-  expected_bits_ = smallest.bits;
-  coded_ = std::move(smallest.coded);
   return {};
 }
 
-/// At first only what comes near to the promise, later what is not far below.
-bool RateSearch::is_kept(int tries, double share_of_aim) const {
-  const double share = kRmsAim * share_of_aim;
-  return share <= 1 && share >= (tries < kTriesForNear ? kNearRms : kLeastRms);
+/// Every try is a coding of the map: the best is taken as it is.
+Status RateSearch::seek_whole(CodingPlan& plan, const MapSchema& schema, double rms_m, const Range& steps,
+                              double& slope) {
+  WholeSearch search(sample_, schema, arena_, stop_, rms_m, slope);
+  MAPCODEC_ASSIGN(auto best, search.run(plan, steps.finest, steps.coarsest));
+  slope = search.rms_slope();
+  leapt_ = search.leapt();
+  surfaces_alone_ = surfaces_alone_ && search.surfaces_alone();
+  found_ = best ? best->sum : search.last();
+  if (best) {
+    plan = best->plan;
+    coded_ = std::move(best->coded);
+  }
+  expected_bits_ = found_.geometry_bits_per_point();
+  return {};
 }
 
-/// Errors first on little, which gives the slope; sizes not, because small tiles take more bits.
-Status RateSearch::seek(CodingPlan& plan, const MapSchema& schema, Value value, double target, double slope,
-                        const Range& steps) {
-  if (value == &CodedSum::rms_m && sample_.points() > 2 * kFewPoints) {
-    MAPCODEC_TRY(seek_on(sample_.part(kFewPoints), plan, schema, value, target, steps, slope));
+/// Errors first on little, which gives the slope.
+Status RateSearch::seek_rms(CodingPlan& plan, const MapSchema& schema, double rms_m, const Range& steps) {
+  double slope = 0.5;
+  coded_.reset();
+  const double aim = kRmsAim * rms_m;
+  if (sample_.points() > 2 * kFewPoints) {
+    MAPCODEC_TRY(seek_on(sample_.part(kFewPoints), plan, schema, &CodedSum::rms_m, aim, steps, slope));
   }
-  MAPCODEC_TRY(seek_on(sample_, plan, schema, value, target, steps, slope));
-  (value == &CodedSum::rms_m ? rms_slope_ : bits_slope_) = std::abs(slope);
+  if (sample_.whole) {
+    MAPCODEC_TRY(seek_whole(plan, schema, rms_m, steps, slope));
+  } else {
+    MAPCODEC_TRY(choose_trade(plan, schema, aim, steps));
+    MAPCODEC_TRY(seek_on(sample_, plan, schema, &CodedSum::rms_m, aim, steps, slope));
+  }
+  rms_slope_ = std::abs(slope);
+  return {};
+}
+
+Status RateSearch::choose_trade(CodingPlan& plan, const MapSchema& schema, double rms_m,
+                                const Range& steps) const {
+  if (!plan.has_surfaces() || plan.tiles.effort == Effort::fast) return {};
+  MAPCODEC_ASSIGN(plan, TradeSearch(large_, schema, arena_, stop_, rms_m).run(plan));
+  plan.step_m = std::clamp(plan.step_m, steps.finest, steps.coarsest);
   return {};
 }
 
@@ -151,7 +135,7 @@ Result<CodingPlan> RateSearch::for_rms(CodingPlan plan, double rms_m) {
   plan.step_m = rms_m * (plan.has_surfaces() ? std::clamp(1.1 * spacings, 0.5, 3.0) : 2.0);
   // Beyond the size of the whole nothing is lost by coarser steps any more, and nothing gained.
   const Range steps{rms_m / 16, 8 * std::max(sample_.side_m, rms_m)};
-  MAPCODEC_TRY(seek(plan, positions_alone(schema_), &CodedSum::rms_m, kRmsAim * rms_m, 0.5, steps));
+  MAPCODEC_TRY(seek_rms(plan, positions_alone(schema_), rms_m, steps));
   return plan;
 }
 
@@ -162,7 +146,9 @@ Result<CodingPlan> RateSearch::for_bits(CodingPlan plan, double bits_per_point) 
   }
   const Range steps{sample_.side_m * kFinest, sample_.side_m / 8};
   plan.step_m = std::clamp(sample_.spacing_m, steps.finest, steps.coarsest);
-  MAPCODEC_TRY(seek(plan, schema_, &CodedSum::bits_per_point, bits_per_point, -1, steps));
+  double slope = -1;
+  MAPCODEC_TRY(seek_on(sample_, plan, schema_, &CodedSum::bits_per_point, bits_per_point, steps, slope));
+  bits_slope_ = std::abs(slope);
   if (plan.step_m == steps.coarsest && found_.bits_per_point() > bits_per_point * (1 + kCloseEnough)) {
     return make_error(ErrorCode::kInvalidArgument,
                       "the asked size cannot be reached: channels take more than that alone");

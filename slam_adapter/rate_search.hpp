@@ -12,8 +12,10 @@ namespace mapcodec {
 class RateSearch {
  public:
   /// All must outlive the search. @param schema  its channels count for sizes, not for errors.
-  RateSearch(const TileSample& sample, const MapSchema& schema, Arena& arena, const std::atomic<bool>* stop)
-      : sample_(sample), schema_(schema), arena_(arena), stop_(stop) {}
+  /// @param large  of take_large_sample; not looked at where `sample` is the whole map.
+  RateSearch(const TileSample& sample, const TileSample& large, const MapSchema& schema, Arena& arena,
+             const std::atomic<bool>* stop)
+      : sample_(sample), large_(large), schema_(schema), arena_(arena), stop_(stop) {}
 
   /// The step with which the sample's RMS is a little below `rms_m`, within about 1 %. Where even coarse
   /// steps lose less (all points equal, say), a coarse one. Where the sample is the whole map, mostly one
@@ -41,7 +43,7 @@ class RateSearch {
   [[nodiscard]] double bits_slope() const { return bits_slope_; }
 
  private:
-  const TileSample& sample_;
+  const TileSample &sample_, &large_;
   const MapSchema& schema_;
   Arena& arena_;
   const std::atomic<bool>* stop_;
@@ -49,11 +51,13 @@ class RateSearch {
   struct Range {
     double finest, coarsest;
   };
-  [[nodiscard]] Status seek(CodingPlan& plan, const MapSchema& schema, Value value, double target,
-                            double slope, const Range& steps);
+  [[nodiscard]] Status seek_rms(CodingPlan& plan, const MapSchema& schema, double rms_m, const Range& steps);
+  [[nodiscard]] Status seek_whole(CodingPlan& plan, const MapSchema& schema, double rms_m, const Range& steps,
+                                  double& slope);
+  [[nodiscard]] Status choose_trade(CodingPlan& plan, const MapSchema& schema, double rms_m,
+                                    const Range& steps) const;
   [[nodiscard]] Status seek_on(const TileSample& sample, CodingPlan& plan, const MapSchema& schema,
                                Value value, double target, const Range& steps, double& slope);
-  [[nodiscard]] bool is_kept(int tries, double share_of_aim) const;
 
   CodedSum found_;
   std::optional<CodedTiles> coded_;

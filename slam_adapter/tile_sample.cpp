@@ -14,7 +14,11 @@
 namespace mapcodec {
 namespace {
 
-constexpr std::size_t kMostPieces = 16, kSamplePoints = 300000;
+struct Size {
+  std::size_t pieces, points;
+};
+constexpr std::size_t kSamplePoints = 300000;
+constexpr Size kUsual{16, kSamplePoints}, kLarge{4, 400000};
 constexpr std::size_t kSpacingQueries = 4000;
 
 double longest_side(const Box& b, std::size_t& axis) {
@@ -52,19 +56,19 @@ struct Pick {
 };
 
 /// Tiles at even distances of points, so that each region counts as much as it does in the map.
-std::vector<Pick> picked(const TileSet& tiles, bool whole) {
+std::vector<Pick> picked(const TileSet& tiles, const Size& size, bool whole) {
   std::vector<Pick> picks;
   std::uint64_t before = 0;
   std::size_t next = 0;
   for (std::size_t i = 0; i < tiles.tiles().size(); ++i) {
     const std::uint64_t end = before + tiles.tiles()[i].points;
     std::size_t times = 0;
-    while (next < kMostPieces && (2 * next + 1) * tiles.points() / (2 * kMostPieces) < end) ++next, ++times;
+    while (next < size.pieces && (2 * next + 1) * tiles.points() / (2 * size.pieces) < end) ++next, ++times;
     before = end;
     if (whole) {
-      picks.push_back({i, kSamplePoints});
+      picks.push_back({i, size.points});
     } else if (times > 0) {
-      picks.push_back({i, times * kSamplePoints / kMostPieces});
+      picks.push_back({i, times * size.points / size.pieces});
     }
   }
   return picks;
@@ -82,6 +86,19 @@ void measure(TileSample& sample, Arena& arena) {
     weighted += spacings[i] * static_cast<double>(sample.pieces[i].size());
   }
   if (sample.points() > 0) sample.spacing_m = weighted / static_cast<double>(sample.points());
+}
+
+Result<TileSample> take(const Size& size, const TileSet& tiles, const MapSchema& schema, Arena& arena) {
+  TileSample sample;
+  sample.whole = tiles.points() <= kSamplePoints;
+  const TileNeighbors neighbors(tiles, schema.origin, schema.tile_size_m);
+  for (const auto& [tile, points] : picked(tiles, size, sample.whole)) {
+    MAPCODEC_ASSIGN(const PointCloud cloud, tiles.load(tile));
+    sample.pieces.push_back(cut(cloud, points));
+    if (sample.whole) sample.borders.push_back(neighbors.borders_of(tiles.tiles()[tile].key));
+  }
+  measure(sample, arena);
+  return sample;
 }
 
 }  // namespace
@@ -120,16 +137,11 @@ double mean_spacing(std::vector<Vec3> points) {
 }
 
 Result<TileSample> take_sample(const TileSet& tiles, const MapSchema& schema, Arena& arena) {
-  TileSample sample;
-  sample.whole = tiles.points() <= kSamplePoints;
-  const TileNeighbors neighbors(tiles, schema.origin, schema.tile_size_m);
-  for (const auto& [tile, points] : picked(tiles, sample.whole)) {
-    MAPCODEC_ASSIGN(const PointCloud cloud, tiles.load(tile));
-    sample.pieces.push_back(cut(cloud, points));
-    if (sample.whole) sample.borders.push_back(neighbors.borders_of(tiles.tiles()[tile].key));
-  }
-  measure(sample, arena);
-  return sample;
+  return take(kUsual, tiles, schema, arena);
+}
+
+Result<TileSample> take_large_sample(const TileSet& tiles, const MapSchema& schema, Arena& arena) {
+  return take(kLarge, tiles, schema, arena);
 }
 
 Result<CodedSum> encode_sample(const TileSample& sample, const MapSchema& schema, const CodingPlan& plan,

@@ -26,6 +26,9 @@ struct TileSample {
 /// so that trying is cheap. The same for any number of threads. Errors: those of TileSet::load.
 /// @param schema  of the map: says where tiles lie.
 [[nodiscard]] Result<TileSample> take_sample(const TileSet& tiles, const MapSchema& schema, Arena& arena);
+/// Fewer and larger parts, for what depends on how much a tile holds; the whole map if it is small.
+[[nodiscard]] Result<TileSample> take_large_sample(const TileSet& tiles, const MapSchema& schema,
+                                                   Arena& arena);
 
 /// A sample as coded.
 struct CodedTiles {
