@@ -3,6 +3,7 @@
 #pragma once
 
 #include <atomic>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -14,6 +15,8 @@
 #include "slam_adapter/formats/bag_options.hpp"
 
 namespace mapcodec {
+
+class MapWriter;
 
 struct CompressOptions {
   PromiseKind promise = PromiseKind::rms;
@@ -43,6 +46,8 @@ struct CompressOptions {
   bool overwrite = false;
   ProgressCallback progress;
   const std::atomic<bool>* stop = nullptr;
+  std::function<Status(MapWriter&)>
+      beside;  ///< what else goes into the archive with the points; may be empty
 };
 
 struct CompressReport {

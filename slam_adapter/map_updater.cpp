@@ -466,8 +466,10 @@ Result<MapUpdater> MapUpdater::open(const std::string& path, Arena& arena, const
   return over(std::move(writer), arena, settings);
 }
 
-Result<MapUpdater> MapUpdater::over(MapWriter writer, Arena& arena, const UpdateSettings& settings) {
+Result<MapUpdater> MapUpdater::over(MapWriter writer, Arena& arena, const UpdateSettings& settings,
+                                    bool changed) {
   auto state = std::make_unique<State>(std::move(writer), arena, settings);
+  state->changed = changed;
   MAPCODEC_TRY(state->begin());
   return MapUpdater(std::move(state));
 }
@@ -504,6 +506,7 @@ Result<std::uint32_t> MapUpdater::submap(const std::string& name, const std::opt
 }
 
 Status MapUpdater::set_poses(std::span<const PoseChange> poses) {
+  MAPCODEC_TRY(check_octree_pose(state_->writer.info(), poses));
   MAPCODEC_TRY(state_->writer.set_poses(poses));
   state_->changed = state_->changed || !poses.empty();
   return {};
@@ -522,6 +525,7 @@ Status MapUpdater::set_stamps(std::uint32_t submap, double first_s, double last_
 Status MapUpdater::insert(PointCloud points, std::uint32_t submap, ScanEnd end) {
   State& s = *state_;
   MAPCODEC_TRY(s.holds_points());
+  MAPCODEC_TRY(check_holds_points(s.writer.info(), submap));
   std::uint64_t dropped = 0;
   MAPCODEC_ASSIGN(PointCloud fitted, fit_to_schema(std::move(points), s.schema, dropped));
   s.report.dropped_points += dropped;
