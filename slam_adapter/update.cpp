@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <sstream>
 
+#include "mapcodec/cloud/normals.hpp"
 #include "maps/moved_points.hpp"
 #include "slam_adapter/create_map.hpp"
 #include "slam_adapter/formats/formats.hpp"
@@ -85,6 +86,9 @@ Status insert_file(MapUpdater& map, const std::string& path, const UpdateRequest
   read.bag = r.bag;
   MAPCODEC_ASSIGN(const std::unique_ptr<PointSource> source, open_source(path, read));
   say_unkept(path, source->layout(), map.schema(), warnings);
+  if (const auto normals = unturned_normals(source->layout()); normals && r.pose)
+    warnings.push_back(path + ": the channel " + *normals +
+                       " stays as it is: only normals of three floats turn with the pose");
   const RigidMotion pose =
       r.pose && r.submap.empty() ? RigidMotion(r.pose->translation_m, r.pose->rotation_xyzw) : RigidMotion();
   if (const Status s = insert_source(map, *source, pose, submap); !s.ok()) return named(path, s.error());
