@@ -19,6 +19,7 @@ Status MapUpdater::State::fold(std::size_t least) {
   for (const TileRecord* t : writer.tiles()) {
     if (t->submap != octree && t->segments.size() >= least) all.push_back({t->submap, t->key});
   }
+  note_neighbors(all, {});
   // So many at once share the promise; never by the number of threads, which must not change the bytes.
   for (const TilePlace& p : all) {
     const std::uint64_t points = writer.find(p.key, p.submap)->points;
@@ -46,7 +47,7 @@ Status MapUpdater::State::fold_some(const std::vector<TilePlace>& places) {
   for (const TilePlace& p : places) {
     const TileRecord& record = *writer.find(p.key, p.submap);
     MAPCODEC_ASSIGN(std::vector<Bytes> segments, read_all(record));
-    tasks.push_back({std::move(segments), record.errors, record.bounds});
+    tasks.push_back({std::move(segments), record.errors, record.bounds, borders_of(p)});
   }
   const RunEach run = [this](std::size_t count, const std::function<Status(std::size_t)>& body) {
     return run_all(count, body);

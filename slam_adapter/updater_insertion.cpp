@@ -18,6 +18,11 @@ Status MapUpdater::State::flush() {
   held.clear();
   held_points = 0;
   cache.next_batch();
+  if (settings.for_good) {
+    std::vector<TilePlace> places;
+    for (const auto& [place, scans] : tiles) places.push_back(place);
+    note_neighbors(places, places);
+  }
   while (!tiles.empty()) MAPCODEC_TRY(flush_some(take_some(tiles)));
   return stopped();
 }
@@ -92,6 +97,7 @@ Result<TileWork> MapUpdater::State::prepare(const TilePlace& place) {
   const TileRecord* record = writer.find(place.key, place.submap);
   w.begins = record == nullptr;
   w.cap = settings.density_cap;
+  if (settings.for_good && w.begins) w.borders = borders_of(place);
   w.allowed_rms_m = schema.promise_value;
   if (!settings.density_cap || record == nullptr) return w;
   // A tile may have more than the map on the whole, and then its own points coming again are no news.

@@ -48,6 +48,26 @@ TileDirectory& MapUpdater::State::directory(std::uint32_t submap) {
   return directories.try_emplace(submap, schema.origin, schema.tile_size_m, new_level).first->second;
 }
 
+void MapUpdater::State::note_neighbors(const std::vector<TilePlace>& places,
+                                       const std::vector<TilePlace>& more) {
+  neighbors.clear();
+  if (schema.promise != PromiseKind::rms) return;  // no surfaces
+  std::map<std::uint32_t, std::vector<TileKey>> keys;
+  for (const TilePlace& p : places) keys[p.submap];
+  const auto note = [&](std::uint32_t submap, const TileKey& key) {
+    if (const auto at = keys.find(submap); at != keys.end()) at->second.push_back(key);
+  };
+  for (const TileRecord* t : writer.tiles()) note(t->submap, t->key);
+  for (const TilePlace& p : more) note(p.submap, p.key);
+  for (const auto& [submap, tiles] : keys)
+    neighbors.try_emplace(submap, tiles, schema.origin, schema.tile_size_m);
+}
+
+TileBorders MapUpdater::State::borders_of(const TilePlace& place) const {
+  const auto at = neighbors.find(place.submap);
+  return at == neighbors.end() ? TileBorders{} : at->second.borders_of(place.key);
+}
+
 Result<std::vector<Bytes>> MapUpdater::State::read_all(const TileRecord& record) const {
   std::vector<Bytes> all;
   for (const SegmentRef& s : record.segments) {

@@ -5,6 +5,7 @@
 #include <functional>
 #include <map>
 
+#include "parallel/tile_neighbors.hpp"
 #include "slam_adapter/fold_tile.hpp"
 #include "slam_adapter/map_updater.hpp"
 #include "slam_adapter/rms_account.hpp"
@@ -25,6 +26,7 @@ struct MapUpdater::State {
   std::uint8_t new_level = 0;
   std::optional<std::uint32_t> octree;  ///< submap whose tiles are no points
   std::map<std::uint32_t, TileDirectory> directories;
+  std::map<std::uint32_t, TileNeighbors> neighbors;  ///< by submap, of what is coded for good at present
   struct Held {
     std::uint32_t submap = 0;
     ScanPart part;
@@ -44,6 +46,9 @@ struct MapUpdater::State {
   // state: what all parts use.
   Status begin();
   TileDirectory& directory(std::uint32_t submap);
+  /// Notes which tiles lie beside those at `places`, of the stored ones and of `more`.
+  void note_neighbors(const std::vector<TilePlace>& places, const std::vector<TilePlace>& more);
+  TileBorders borders_of(const TilePlace& place) const;
   Result<std::vector<Bytes>> read_all(const TileRecord& record) const;
   Status run_all(std::size_t count, const std::function<Status(std::size_t)>& body);
   Status holds_points() const;
