@@ -88,7 +88,7 @@ Status insert_file(MapUpdater& map, const std::string& path, const UpdateRequest
   say_unkept(path, source->layout(), map.schema(), warnings);
   if (const auto normals = unturned_normals(source->layout()); normals && r.pose)
     warnings.push_back(path + ": the channel " + *normals +
-                       " stays as it is: only normals of three floats turn with the pose");
+                       " stays as it is: only \"normal\" of three floats or doubles turns with the pose");
   const RigidMotion pose =
       r.pose && r.submap.empty() ? RigidMotion(r.pose->translation_m, r.pose->rotation_xyzw) : RigidMotion();
   if (const Status s = insert_source(map, *source, pose, submap); !s.ok()) return named(path, s.error());
@@ -177,20 +177,22 @@ Status merge_octree(MapWriter& writer, const MapFile& other, const MergeRequest&
   ReadSettings read;
   read.arena = &arena;
   read.stop = request.settings.stop;
-  MAPCODEC_ASSIGN(const std::optional<OctreeFile> octree, octree_of(other, read));
-  if (!octree) return {};
+  const auto octree = octree_of(other, read);
+  if (!octree.ok()) return named(other.path(), octree.error());
+  if (!*octree) return {};
   OccupancyWrite write;
   write.arena = &arena;
   write.stop = request.settings.stop;
   const bool alone = other.schema().occupancy.has_value();
   if (alone) write.input_bytes = other.archive().info().input_bytes;
-  const auto laid = lay_octree(writer, octree->tree, octree->resolution_m, write);
-  if (!laid.ok() && laid.error().code == ErrorCode::kInvalidArgument && !alone) {
-    warnings.push_back(other.path() + ": its octree is left out: " + laid.error().message);
+  const auto laid = lay_octree(writer, (*octree)->tree, (*octree)->resolution_m, write);
+  if (laid.ok()) {
+    add_tiles(sum, *laid);
     return {};
   }
-  if (!laid.ok()) return laid.error();
-  add_tiles(sum, *laid);
+  if (laid.error().code != ErrorCode::kInvalidArgument) return laid.error();  // the map's own
+  if (alone) return named(other.path(), laid.error());
+  warnings.push_back(other.path() + ": its octree is left out: " + laid.error().message);
   return {};
 }
 
@@ -228,8 +230,7 @@ Result<UpdateReport> merge_maps(const std::string& map_path, const MergeRequest&
   MAPCODEC_ASSIGN(const std::vector<MapFile> others, open_others(map_path, request.others));
   UpdateReport octrees;
   for (const MapFile& other : others) {
-    const Status s = merge_octree(writer, other, request, arena, octrees, warnings);
-    if (!s.ok()) return named(other.path(), s.error());
+    MAPCODEC_TRY(merge_octree(writer, other, request, arena, octrees, warnings));
   }
   MAPCODEC_ASSIGN(MapUpdater map,
                   MapUpdater::over(std::move(writer), arena, request.settings, octrees.committed));

@@ -21,8 +21,7 @@ Status check_still(const std::string& name, const Vec3& translation_m,
       "submap '" + name +
           "' holds an octree, which lies on its own grid and cannot be moved: leave its pose at "
           "0,0,0,0,0,0,1 (the verb pose sets it back), and after a correction make a new octree of the "
-          "points "
-          "(decompress --as bt, then update)");
+          "points (decompress --as bt, then update)");
 }
 
 }  // namespace

@@ -90,7 +90,7 @@ class Scans final : public BagScans {
     if (poses_) r.insert(r.end(), poses_->warnings().begin(), poses_->warnings().end());
     if (const auto name = unturned_normals(layout_); name && poses_)
       r.push_back("the channel " + *name +
-                  " stays as it is: only normals of three floats turn with the poses");
+                  " stays as it is: only \"normal\" of three floats or doubles turns with the poses");
     const std::string of = " of " + std::to_string(seen_) + " clouds ";
     if (without_pose_ > 0)
       r.push_back(std::to_string(without_pose_) + of + "have no pose at their time and are left out");

@@ -134,7 +134,9 @@ TEST_F(OctreeLayers, MergingRefusesMovedOnes) {
   expect_moved(refused.error());
   EXPECT_NE(refused.error().message.find("moved.mapc"), std::string::npos);
   EXPECT_EQ(MapFile::open(plain)->archive().revision(), 1u);
-  expect_moved(merge(moved, other).error());
+  const auto own = merge(moved, other);
+  expect_moved(own.error());
+  EXPECT_EQ(own.error().message.find("other.mapc"), std::string::npos) << own.error().message;
   expect_moved(update_occupancy_map(moved, other_, 0.1, {}).error());
 }
 
