@@ -10,14 +10,23 @@ TileKey parent_of(const TileKey& k) {
   return {k.x >> 1, k.y >> 1, k.z >> 1, static_cast<std::uint8_t>(k.level + 1)};
 }
 
+std::vector<TileKey> keys_of(const TileSet& tiles) {
+  std::vector<TileKey> keys;
+  for (const TileSet::Entry& t : tiles.tiles()) keys.push_back(t.key);
+  return keys;
+}
+
 }  // namespace
 
 TileNeighbors::TileNeighbors(const TileSet& tiles, const Vec3& origin, double tile_size_m)
+    : TileNeighbors(keys_of(tiles), origin, tile_size_m) {}
+
+TileNeighbors::TileNeighbors(std::span<const TileKey> tiles, const Vec3& origin, double tile_size_m)
     : origin_(origin), tile_size_m_(tile_size_m) {
-  for (const TileSet::Entry& t : tiles.tiles()) {
-    if (t.key.is_unplaced()) continue;
-    tiles_.insert(t.key);
-    highest_ = std::max(highest_, t.key.level);
+  for (const TileKey& key : tiles) {
+    if (key.is_unplaced()) continue;
+    tiles_.insert(key);
+    highest_ = std::max(highest_, key.level);
   }
   for (const TileKey& tile : tiles_) {
     for (TileKey k = tile; k.level < highest_ && around_tiles_.insert(parent_of(k)).second;) k = parent_of(k);

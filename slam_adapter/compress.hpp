@@ -3,6 +3,7 @@
 #pragma once
 
 #include <atomic>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -14,6 +15,8 @@
 #include "slam_adapter/formats/bag_options.hpp"
 
 namespace mapcodec {
+
+class MapWriter;
 
 struct CompressOptions {
   PromiseKind promise = PromiseKind::rms;
@@ -27,12 +30,12 @@ struct CompressOptions {
   /// made finer. Otherwise what is reachable is recorded as the bound, with a warning.
   bool color_error_asked = false;
   std::vector<std::string> channels{"all"};  ///< "all", "none" or names
-  bool constants = true;   ///< a channel that is the same for all points is stored once, for good
+  bool constants =
+      true;  ///< a channel that is the same for all points is stored once, for good; not by maps that grow
   double tile_size_m = 0;  ///< 0: from the density, 100,000 points a tile, 600,000 of surfaces
   Effort effort = Effort::standard;
-  bool keep_order = false;      ///< lossless: also the order of points
-  bool store_constants = true;  ///< a channel in which all points are equal is stored once for the map
-  bool keep_counts = true;      ///< false: points in one voxel become one
+  bool keep_order = false;  ///< lossless: also the order of points
+  bool keep_counts = true;  ///< false: points in one voxel become one
   PaperSettings paper;
   double unit_m = 1;                   ///< metres per unit of the input files (3DTK's centimetres: 0.01)
   BagOptions bag;                      ///< of ROS bags among the input files
@@ -43,6 +46,8 @@ struct CompressOptions {
   bool overwrite = false;
   ProgressCallback progress;
   const std::atomic<bool>* stop = nullptr;
+  std::function<Status(MapWriter&)>
+      beside;  ///< what else goes into the archive with the points; may be empty
 };
 
 struct CompressReport {

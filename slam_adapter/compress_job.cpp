@@ -402,6 +402,7 @@ Status CompressJob::commit() {
   MAPCODEC_ASSIGN(const LevelErrors levels, levels_->measure(schema_, runner));
   if (levels.levels.size() > 1) info.extras[kLevelsExtra] = write_level_errors(levels);
   MAPCODEC_TRY(writer_->set_info(std::move(info)));
+  if (options_.beside) MAPCODEC_TRY(options_.beside(*writer_));
   // No clock in the archive of a new map: the same input gives the same bytes.
   const auto revision = writer_->commit(0);
   return revision.ok() ? Status{} : Status(revision.error());

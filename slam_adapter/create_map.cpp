@@ -81,8 +81,8 @@ Result<MapSchema> schema_for_growth(PointSource& first, const CompressOptions& o
   survey_settings.stop = options.stop;
   if (options.max_memory_bytes > 0) survey_settings.memory_budget_bytes = options.max_memory_bytes;
   MAPCODEC_ASSIGN(Survey look, survey(first, survey_settings));
-  if (!options.store_constants)
-    std::fill(look.constant_channels.begin(), look.constant_channels.end(), std::nullopt);
+  // What all points of the first source have in common, those of the next may not.
+  std::fill(look.constant_channels.begin(), look.constant_channels.end(), std::nullopt);
   const auto parent = std::filesystem::path(path).parent_path();
   return schema_for(std::move(look), options, arena, parent.empty() ? "." : parent.string(), warnings);
 }

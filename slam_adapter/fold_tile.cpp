@@ -63,18 +63,19 @@ MapSchema schema_for_good(const MapSchema& schema, bool from_pending) {
   return with_color_share(schema, from_pending ? kFoldedColor : 1);
 }
 
-Result<EncodedTile> encode_for_good(PointCloud points, const MapSchema& schema, bool from_pending) {
-  const PointCloud tile = with_all_channels(std::move(points), schema);
+Result<EncodedTile> encode_for_good(PointCloud points, const MapSchema& schema, bool from_pending,
+                                    const TileBorders& borders) {
+  const RmsTile tile{with_all_channels(std::move(points), schema), borders};
   const MapSchema target = schema_for_good(schema, from_pending);
   TileSettings s;
   switch (schema.promise) {
     case PromiseKind::lossless:
       s.codec = CodecId::lossless;
-      return encode_tile(tile, schema, s);
+      return encode_tile(tile.points, schema, s);
     case PromiseKind::rms:
       return encode_for_rms(tile, target, (from_pending ? kFoldedShare : 1) * schema.promise_value);
     default:
-      return encode_tile(tile, target, s);
+      return encode_tile(tile.points, target, s);
   }
 }
 

@@ -40,9 +40,10 @@ struct Fold {
 /// Codes points of one tile for good: the cheapest coding within the promise, or what of it pending ones
 /// leave.
 /// @param points  laid out as what a tile of `schema` decodes to. @param from_pending  they were coded
-/// before. Errors: those of encoding; PromiseBroken.
+/// before. @param borders  of surfaces: where they go on in other tiles.
+/// Errors: those of encoding; PromiseBroken.
 [[nodiscard]] Result<EncodedTile> encode_for_good(PointCloud points, const MapSchema& schema,
-                                                  bool from_pending);
+                                                  bool from_pending, const TileBorders& borders);
 /// What it codes by: the map's schema with the colour bound that pending points leave.
 [[nodiscard]] MapSchema schema_for_good(const MapSchema& schema, bool from_pending);
 /// Decoded points have no dropped channels; encoders want them in their places all the same.

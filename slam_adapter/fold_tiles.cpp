@@ -12,8 +12,10 @@ struct Parts {
   std::optional<PointCloud> pending;  ///< the points to be coded
   bool any_pending = false;           ///< among those
   bool to_fold = false;
+  TileBorders borders;
 
   Status open(const FoldTask& task, const MapSchema& schema) {
+    borders = task.borders;
     const Bytes joined = join_segments(task.segments);
     MAPCODEC_ASSIGN(const std::vector<ByteSpan> all, split_segments(joined));
     to_fold = task.segments.size() > 1 || std::any_of(all.begin(), all.end(), is_pending);
@@ -81,16 +83,17 @@ Result<std::vector<std::optional<EncodedTile>>> code_pending(std::vector<Parts>&
   if (schema.promise != PromiseKind::rms) {
     MAPCODEC_TRY(run(parts.size(), [&](std::size_t i) -> Status {
       if (!parts[i].pending) return {};
-      MAPCODEC_ASSIGN(coded[i], encode_for_good(std::move(*parts[i].pending), schema, parts[i].any_pending));
+      MAPCODEC_ASSIGN(coded[i],
+                      encode_for_good(std::move(*parts[i].pending), schema, parts[i].any_pending, {}));
       return {};
     }));
     return coded;
   }
-  std::vector<PointCloud> tiles;
+  std::vector<RmsTile> tiles;
   std::vector<std::size_t> numbers;
   for (std::size_t i = 0; i < parts.size(); ++i) {
     if (!parts[i].pending) continue;
-    tiles.push_back(with_all_channels(std::move(*parts[i].pending), schema));
+    tiles.push_back({with_all_channels(std::move(*parts[i].pending), schema), parts[i].borders});
     numbers.push_back(i);
   }
   const MapSchema target = schema_for_good(schema, true);

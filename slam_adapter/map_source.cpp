@@ -4,7 +4,7 @@
 #include <algorithm>
 
 #include "maps/submap_pose.hpp"
-#include "slam_adapter/octomap/octree_layer.hpp"
+#include "slam_adapter/octomap/octree_jobs.hpp"
 
 namespace mapcodec {
 
@@ -49,6 +49,16 @@ Result<CompressReport> flatten_map(const std::string& map_path, const std::strin
   const MapSchema& schema = map.schema();
   if (schema.promise == PromiseKind::paper)
     return make_error(ErrorCode::kUnsupported, "a map by the paper's method has no submaps to flatten");
+  if (schema.occupancy)
+    return make_error(ErrorCode::kUnsupported,
+                      "is a map of an octree alone, which has no submaps to flatten");
+  MAPCODEC_ASSIGN(const std::optional<OctreeFile> octree, octree_of(map, {}));
+  if (octree) {
+    options.beside = [&octree](MapWriter& writer) -> Status {
+      const auto laid = lay_octree(writer, octree->tree, octree->resolution_m, {});
+      return laid.ok() ? Status{} : Status(laid.error());
+    };
+  }
   options.promise = schema.promise;
   options.promise_m = schema.promise_value;
   for (const ChannelSchema& c : schema.channels) {

@@ -28,8 +28,11 @@ class MapSource final : public PointSource {
 
 /// Writes the map with all submaps as one, in the map's frame, to a new archive. It promises to the points as
 /// they decode now what the map promised to its originals: to those the errors of both add up.
+/// An octree beside the points stays as it is.
 /// @param options  promise and colour bound are taken from the map.
-/// Errors: those of MapFile and of `compress`; Unsupported (a map by the paper's method).
+/// Errors: those of MapFile and of `compress`; Unsupported (a map by the paper's method or of an octree
+/// alone; an octree that was moved by a pose); InvalidArgument (the octree's voxels do not fit the new
+/// tiles).
 [[nodiscard]] Result<CompressReport> flatten_map(const std::string& map_path, const std::string& path,
                                                  CompressOptions options);
 

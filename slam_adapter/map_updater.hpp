@@ -59,8 +59,9 @@ class MapUpdater {
                                                const UpdateSettings& settings = {});
   /// Goes on with a writer that is open, as of an archive just begun. Errors: Malformed (schema),
   /// Unsupported.
+  /// @param changed  the writer has changes already that its next revision shall hold.
   [[nodiscard]] static Result<MapUpdater> over(MapWriter writer, Arena& arena,
-                                               const UpdateSettings& settings = {});
+                                               const UpdateSettings& settings = {}, bool changed = false);
   MapUpdater(MapUpdater&&) noexcept;
   MapUpdater& operator=(MapUpdater&&) noexcept;
   ~MapUpdater();
@@ -70,9 +71,10 @@ class MapUpdater {
   [[nodiscard]] std::uint64_t revision() const;
 
   /// Number of the submap called `name`, made if there is none. A pose, if given, is set.
-  /// Errors: InvalidArgument (name empty or longer than 255 bytes; pose).
+  /// Errors: InvalidArgument (name empty or longer than 255 bytes; pose), Unsupported (as set_poses).
   [[nodiscard]] Result<std::uint32_t> submap(const std::string& name, const std::optional<PoseChange>& pose);
-  /// Errors: InvalidArgument, as MapWriter::set_poses. No tile is touched.
+  /// Errors: InvalidArgument, as MapWriter::set_poses; Unsupported (an octree would be moved). No tile is
+  /// touched.
   [[nodiscard]] Status set_poses(std::span<const PoseChange> poses);
 
   /// When the scans of a submap were taken [s since epoch]. Errors: InvalidArgument (no such submap).
@@ -84,7 +86,8 @@ class MapUpdater {
   /// @param points  [m, submap frame]; channels in any order. What the map does not keep is left out; what it
   /// keeps must be there. Points that are not finite are dropped and counted (lossless maps: kept).
   /// Errors: Malformed (a kept channel is missing or of another type, another constant), InvalidArgument
-  /// (coordinates that a lossless map cannot hold), Unsupported (a map of an octree alone), those of `flush`.
+  /// (coordinates that a lossless map cannot hold), Unsupported (a map of an octree alone, or the submap that
+  /// holds one), those of `flush`.
   [[nodiscard]] Status insert(PointCloud points, std::uint32_t submap = 0, ScanEnd end = ScanEnd::here);
   /// Erases points of one submap, or of all (then `e` is in the map's frame, and a box needs submaps that are
   /// not rotated; nothing: all points). Tiles that are left empty go away.

@@ -13,7 +13,11 @@ Error bad_channel(const ChannelSchema& c, const std::string& why) {
 Status check_constant(const ChannelSchema& c, const Channel& values) {
   for (std::size_t i = 0; i < values.size(); ++i) {
     if (std::memcmp(values.at(i), c.constant.data(), c.constant.size()) != 0)
-      return bad_channel(c, "is the same for all points of the map, and these have another value");
+      return bad_channel(
+          c,
+          "is the same for all points of the map, which stores it once for good, and these have "
+          "another value: begin another map with them (update --create), and merge this one "
+          "into it");
   }
   return {};
 }

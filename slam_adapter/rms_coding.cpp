@@ -20,16 +20,24 @@ double larger_rms(const EncodedTile& t) {
   return std::max(t.rms_forward_m, t.rms_backward_m);
 }
 
+TileSettings surfaces_of(const RmsTile& tile, double step_m) {
+  TileSettings s;
+  s.codec = CodecId::surface;
+  s.step_m = step_m;
+  s.borders = tile.borders;
+  return s;
+}
+
 class TileForRms {
  public:
-  TileForRms(const PointCloud& tile, const MapSchema& schema, double rms_m, double start_m)
+  TileForRms(const RmsTile& tile, const MapSchema& schema, double rms_m, double start_m)
       : tile_(tile), schema_(schema), bare_(positions_alone(schema)), rms_m_(rms_m), start_m_(start_m) {}
 
   Result<EncodedTile> encode() {
     try_points();
     try_surfaces();
     if (!best_) return make_error(ErrorCode::kPromiseBroken, "no coding of a tile keeps the promise");
-    return encode_tile(tile_, schema_, settings_);
+    return encode_tile(tile_.points, schema_, settings_);
   }
 
  private:
@@ -46,7 +54,7 @@ class TileForRms {
     TileSettings s;
     s.step_m = 0.995 * rms_m_ / kRmsOfCell;
     for (int i = 0; i < 3; ++i) {
-      const auto t = encode_tile(tile_, bare_, s);
+      const auto t = encode_tile(tile_.points, bare_, s);
       if (!t.ok()) return;
       if (consider(s, *t) || t->errors.rms_m <= rms_m_) return;
       s.step_m *= 0.995 * rms_m_ / t->errors.rms_m;  // clusters off the cells' centres
@@ -55,12 +63,10 @@ class TileForRms {
 
   void try_surfaces() {
     constexpr double kClearlyPoints = 1.6;
-    TileSettings s;
-    s.codec = CodecId::surface;
-    s.step_m = start_m_;
+    TileSettings s = surfaces_of(tile_, start_m_);
     LogSecant secant(kAim * rms_m_, 0.8);
     for (int i = 0; i < 6; ++i) {
-      const auto t = encode_tile(tile_, bare_, s);
+      const auto t = encode_tile(tile_.points, bare_, s);
       if (!t.ok() || consider(s, *t)) return;
       const double rms = larger_rms(*t);
       const bool hopeless =
@@ -70,7 +76,7 @@ class TileForRms {
     }
   }
 
-  const PointCloud& tile_;
+  const RmsTile& tile_;
   const MapSchema& schema_;
   const MapSchema bare_;
   const double rms_m_, start_m_;
@@ -103,24 +109,24 @@ double pooled_rms(const std::vector<EncodedTile>& tiles) {
 
 class TilesForRms {
  public:
-  TilesForRms(std::span<const PointCloud> tiles, const MapSchema& schema, double rms_m, const RunEach& run)
+  TilesForRms(std::span<const RmsTile> tiles, const MapSchema& schema, double rms_m, const RunEach& run)
       : tiles_(tiles), schema_(schema), bare_(positions_alone(schema)), rms_m_(rms_m), run_(run) {}
 
   Result<std::vector<EncodedTile>> encode() {
     const double start = first_step(schema_, rms_m_);
     MAPCODEC_ASSIGN(std::vector<EncodedTile> apart,
-                    code([&](const PointCloud& t) { return encode_for_rms(t, schema_, rms_m_, start); }));
+                    code([&](const RmsTile& t) { return encode_for_rms(t, schema_, rms_m_, start); }));
     if (tiles_.size() < 2) return apart;
     const std::optional<double> step = common_step(start);
     if (!step) return apart;
-    auto together = code([&](const PointCloud& t) { return encode_like_surface(t, *step); });
+    auto together = code([&](const RmsTile& t) { return encode_like_surface(t, *step); });
     const bool better =
         together.ok() && pooled_rms(*together) <= rms_m_ && bytes_of(*together) < bytes_of(apart);
     return better ? std::move(together) : Result<std::vector<EncodedTile>>(std::move(apart));
   }
 
  private:
-  using Coding = std::function<Result<EncodedTile>(const PointCloud&)>;
+  using Coding = std::function<Result<EncodedTile>(const RmsTile&)>;
 
   Result<std::vector<EncodedTile>> code(const Coding& coding) const {
     std::vector<EncodedTile> coded(tiles_.size());
@@ -136,10 +142,8 @@ class TilesForRms {
     LogSecant secant(kAim * rms_m_, 0.8);
     std::optional<double> best;
     for (int i = 0; i < 6; ++i) {
-      TileSettings s;
-      s.codec = CodecId::surface;
-      s.step_m = step;
-      const auto coded = code([&](const PointCloud& t) { return encode_tile(t, bare_, s); });
+      const auto coded =
+          code([&](const RmsTile& t) { return encode_tile(t.points, bare_, surfaces_of(t, step)); });
       if (!coded.ok()) return best;
       const double rms = pooled_rms(*coded);
       if (rms <= rms_m_ && (!best || step > *best)) best = step;
@@ -150,16 +154,13 @@ class TilesForRms {
   }
 
   /// With the error that surfaces at this step have, by whatever is cheapest.
-  Result<EncodedTile> encode_like_surface(const PointCloud& tile, double step) const {
-    TileSettings s;
-    s.codec = CodecId::surface;
-    s.step_m = step;
-    MAPCODEC_ASSIGN(const EncodedTile t, encode_tile(tile, bare_, s));
+  Result<EncodedTile> encode_like_surface(const RmsTile& tile, double step) const {
+    MAPCODEC_ASSIGN(const EncodedTile t, encode_tile(tile.points, bare_, surfaces_of(tile, step)));
     return encode_for_rms(tile, schema_, std::clamp(larger_rms(t), 1e-3 * rms_m_, 1.5 * rms_m_) * (1 + 1e-9),
                           step);
   }
 
-  std::span<const PointCloud> tiles_;
+  std::span<const RmsTile> tiles_;
   const MapSchema& schema_;
   const MapSchema bare_;
   const double rms_m_;
@@ -168,12 +169,12 @@ class TilesForRms {
 
 }  // namespace
 
-Result<EncodedTile> encode_for_rms(const PointCloud& tile, const MapSchema& schema, double rms_m,
+Result<EncodedTile> encode_for_rms(const RmsTile& tile, const MapSchema& schema, double rms_m,
                                    double start_m) {
   return TileForRms(tile, schema, rms_m, start_m > 0 ? start_m : first_step(schema, rms_m)).encode();
 }
 
-Result<std::vector<EncodedTile>> encode_for_rms_together(std::span<const PointCloud> tiles,
+Result<std::vector<EncodedTile>> encode_for_rms_together(std::span<const RmsTile> tiles,
                                                          const MapSchema& schema, double rms_m,
                                                          const RunEach& run) {
   return TilesForRms(tiles, schema, rms_m, run).encode();

@@ -27,7 +27,7 @@ Result<Fold> encode_part(PointCloud points, const MapSchema& schema, const Pendi
                          const TileErrors& errors, bool as_pending) {
   const bool exact = is_exact_again(schema);
   MAPCODEC_ASSIGN(EncodedTile t, as_pending ? encode_pending(std::move(points), schema, coding)
-                                            : encode_for_good(std::move(points), schema, !exact));
+                                            : encode_for_good(std::move(points), schema, !exact, {}));
   Fold f;
   f.codec = t.bytes[0];
   f.points = t.points;

@@ -17,7 +17,7 @@ struct TilePart {
 };
 
 /// Splits a tile. Positions that pending segments hold, or that are exact, are coded again without loss;
-/// where colours are within a bound, the parts are folded for good instead.
+/// where colours are within a bound, the parts are folded for good instead, each as if nothing lay beside it.
 /// @param segments  base, then deltas. @param errors  of the tile; those of its parts are not known apart.
 /// @return nothing where it cannot be: a tile of the lowest level, or one with points that were coded with
 /// loss for good. Pure. Errors: as fold_tile.

@@ -82,7 +82,7 @@ Status look_up(TileWork& w, const MapSchema& schema, const PendingCoding& coding
 Status code_added(TileWork& w, const MapSchema& schema, const PendingCoding& coding, bool for_good) {
   if (w.added.empty()) return {};
   if (for_good && w.begins) {
-    MAPCODEC_ASSIGN(w.coded, encode_for_good(std::move(w.added), schema, false));
+    MAPCODEC_ASSIGN(w.coded, encode_for_good(std::move(w.added), schema, false, w.borders));
     return {};
   }
   MAPCODEC_ASSIGN(EncodedTile t, encode_tile(w.added, coding.schema, coding.tiles));

@@ -40,6 +40,7 @@ struct TileWork {
   bool cap = true;                       ///< known points add nothing
   double allowed_rms_m = 0;              ///< that points may have to what stands for them
 
+  TileBorders borders;               ///< if it will be coded for good
   PointCloud added;                  ///< what is new, of all scans; consumed by code_added
   double added_points = 0;           ///< their number
   double known = 0, known_m2 = 0;    ///< number of the other points, and their squared distances [m^2]

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <sstream>
 
+#include "mapcodec/cloud/normals.hpp"
 #include "maps/moved_points.hpp"
 #include "slam_adapter/create_map.hpp"
 #include "slam_adapter/formats/formats.hpp"
@@ -85,6 +86,9 @@ Status insert_file(MapUpdater& map, const std::string& path, const UpdateRequest
   read.bag = r.bag;
   MAPCODEC_ASSIGN(const std::unique_ptr<PointSource> source, open_source(path, read));
   say_unkept(path, source->layout(), map.schema(), warnings);
+  if (const auto normals = unturned_normals(source->layout()); normals && r.pose)
+    warnings.push_back(path + ": the channel " + *normals +
+                       " stays as it is: only \"normal\" of three floats or doubles turns with the pose");
   const RigidMotion pose =
       r.pose && r.submap.empty() ? RigidMotion(r.pose->translation_m, r.pose->rotation_xyzw) : RigidMotion();
   if (const Status s = insert_source(map, *source, pose, submap); !s.ok()) return named(path, s.error());
@@ -147,6 +151,51 @@ Status merge_tiles(MapUpdater& map, const MapFile& other, bool fuse, const std::
   return {};
 }
 
+Result<std::vector<MapFile>> open_others(const std::string& map_path, const std::vector<std::string>& paths) {
+  std::vector<MapFile> others;
+  for (const std::string& path : paths) {
+    std::error_code ignored;
+    if (std::filesystem::equivalent(path, map_path, ignored))
+      return make_error(ErrorCode::kInvalidArgument, path + ": a map cannot be merged with itself");
+    MAPCODEC_ASSIGN(MapFile other, MapFile::open(path));
+    others.push_back(std::move(other));
+  }
+  return others;
+}
+
+void add_tiles(UpdateReport& sum, const UpdateReport& r) {
+  sum.tiles_touched += r.tiles_touched;
+  sum.tiles_new += r.tiles_new;
+  sum.tiles_removed += r.tiles_removed;
+  sum.bytes += r.bytes;
+  sum.committed = sum.committed || r.committed;
+}
+
+/// @param sum  in, out: what the octrees changed.
+Status merge_octree(MapWriter& writer, const MapFile& other, const MergeRequest& request, Arena& arena,
+                    UpdateReport& sum, std::vector<std::string>& warnings) {
+  ReadSettings read;
+  read.arena = &arena;
+  read.stop = request.settings.stop;
+  const auto octree = octree_of(other, read);
+  if (!octree.ok()) return named(other.path(), octree.error());
+  if (!*octree) return {};
+  OccupancyWrite write;
+  write.arena = &arena;
+  write.stop = request.settings.stop;
+  const bool alone = other.schema().occupancy.has_value();
+  if (alone) write.input_bytes = other.archive().info().input_bytes;
+  const auto laid = lay_octree(writer, (*octree)->tree, (*octree)->resolution_m, write);
+  if (laid.ok()) {
+    add_tiles(sum, *laid);
+    return {};
+  }
+  if (laid.error().code != ErrorCode::kInvalidArgument) return laid.error();  // the map's own
+  if (alone) return named(other.path(), laid.error());
+  warnings.push_back(other.path() + ": its octree is left out: " + laid.error().message);
+  return {};
+}
+
 }  // namespace
 
 Result<UpdateReport> update_files(const std::string& map_path, const UpdateRequest& request, Arena& arena,
@@ -177,17 +226,24 @@ Result<UpdateReport> update_files(const std::string& map_path, const UpdateReque
 
 Result<UpdateReport> merge_maps(const std::string& map_path, const MergeRequest& request, Arena& arena,
                                 std::vector<std::string>& warnings) {
-  MAPCODEC_ASSIGN(MapUpdater map, MapUpdater::open(map_path, arena, request.settings));
-  for (const std::string& path : request.others) {
-    std::error_code ignored;
-    if (std::filesystem::equivalent(path, map_path, ignored))
-      return make_error(ErrorCode::kInvalidArgument, path + ": a map cannot be merged with itself");
-    MAPCODEC_ASSIGN(const MapFile other, MapFile::open(path));
-    say_unkept(path, other.schema().layout(), map.schema(), warnings);
-    if (const Status s = merge_tiles(map, other, request.fuse, path); !s.ok()) return named(path, s.error());
+  MAPCODEC_ASSIGN(MapWriter writer, MapWriter::open(map_path));
+  MAPCODEC_ASSIGN(const std::vector<MapFile> others, open_others(map_path, request.others));
+  UpdateReport octrees;
+  for (const MapFile& other : others) {
+    MAPCODEC_TRY(merge_octree(writer, other, request, arena, octrees, warnings));
+  }
+  MAPCODEC_ASSIGN(MapUpdater map,
+                  MapUpdater::over(std::move(writer), arena, request.settings, octrees.committed));
+  for (const MapFile& other : others) {
+    if (other.schema().occupancy) continue;
+    say_unkept(other.path(), other.schema().layout(), map.schema(), warnings);
+    const Status s = merge_tiles(map, other, request.fuse, other.path());
+    if (!s.ok()) return named(other.path(), s.error());
     map.add_input_bytes(other.archive().info().input_bytes);
   }
-  return map.commit(request.timestamp_s);
+  MAPCODEC_ASSIGN(UpdateReport report, map.commit(request.timestamp_s));
+  add_tiles(report, octrees);
+  return report;
 }
 
 }  // namespace mapcodec

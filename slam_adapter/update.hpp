@@ -44,8 +44,11 @@ struct MergeRequest {
   UpdateSettings settings;
 };
 /// Adds the points of other archives as they decode: of plain ones by the rule of updates, of submaps as
-/// submaps with their poses (a name that is taken gets the other file's before it). Errors as recorded are
-/// those to the decoded points of the others. One revision; the archive stays as it was if anything fails.
+/// submaps with their poses (a name that is taken gets the other file's before it). Octrees are laid over the
+/// map's, which gets one if it has none; one of another resolution or kind is left out, with a warning,
+/// unless the other holds nothing else. Errors as recorded are those to the decoded points of the others. One
+/// revision; the archive stays as it was if anything fails.
+/// Errors: those of MapUpdater and MapFile; Unsupported (an octree that was moved by a pose).
 [[nodiscard]] Result<UpdateReport> merge_maps(const std::string& map_path, const MergeRequest& request,
                                               Arena& arena, std::vector<std::string>& warnings);
 

@@ -105,7 +105,6 @@ CompressOptions options_of(const NewMap& map) {
   o.promise_m = map.promise_m;
   o.color_error = map.color_error;
   o.tile_size_m = map.tile_size_m;
-  o.constants = false;
   if (!map.channels.empty()) {
     o.channels.clear();
     for (const ChannelInfo& c : map.channels) o.channels.push_back(c.name);

@@ -37,8 +37,8 @@ enum class ScalarType : std::uint8_t {
   return i < std::size(kNames) ? kNames[i] : "?";
 }
 
-/// Conventional names: "rgb" (u8x3 or u16x3: red, green, blue), "alpha" (u8), "intensity", "normal" (f32x3,
-/// unit), "time", "ring", "label". Any other name is kept as found.
+/// Conventional names: "rgb" (u8x3 or u16x3: red, green, blue), "alpha" (u8), "intensity", "normal" (f32x3 or
+/// f64x3, unit), "time", "ring", "label". Any other name is kept as found.
 struct ChannelInfo {
   std::string name;
   ScalarType scalar = ScalarType::f32;

@@ -3,6 +3,8 @@
 
 #include <Eigen/Dense>
 
+#include "mapcodec/cloud/normals.hpp"
+
 namespace mapcodec {
 namespace {
 
@@ -15,12 +17,15 @@ Normal to_eigen(const Vec3& p) {
 
 const Channel* normal_channel(const PointCloud& cloud) {
   const Channel* c = cloud.find("normal");
-  const bool usable = c != nullptr && c->info.scalar == ScalarType::f32 && c->info.components == 3;
-  return usable && c->size() == cloud.size() ? c : nullptr;
+  return c != nullptr && is_normals(c->info) && c->size() == cloud.size() ? c : nullptr;
 }
 
 Normal stored_normal(const Channel& channel, std::size_t i) {
-  Normal n(channel.get<float>(i, 0), channel.get<float>(i, 1), channel.get<float>(i, 2));
+  Normal n;
+  for (std::size_t d = 0; d < 3; ++d) {
+    n[Eigen::Index(d)] =
+        channel.info.scalar == ScalarType::f32 ? double(channel.get<float>(i, d)) : channel.get<double>(i, d);
+  }
   const double length = n.norm();
   return length > 0 ? Normal(n / length) : n;
 }

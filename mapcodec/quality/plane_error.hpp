@@ -17,9 +17,9 @@ struct NeighborPair {
 };
 
 /// The larger of both directions' mean squared distances along the normal [m^2]. Original points have the
-/// normals of their channel "normal" (f32x3) or those of PCA over `knn` neighbours; a decoded point has the
-/// mean normal of the original points that it is the nearest of. Threads: pure but for `runner`; the same
-/// result for any split.
+/// normals of their channel "normal" (f32x3 or f64x3) or those of PCA over `knn` neighbours; a decoded point
+/// has the mean normal of the original points that it is the nearest of. Threads: pure but for `runner`; the
+/// same result for any split.
 [[nodiscard]] double plane_mean_squared_error(const NeighborPair& pair, int knn, Runner& runner);
 
 }  // namespace mapcodec

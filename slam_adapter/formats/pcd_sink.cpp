@@ -95,7 +95,7 @@ bool add_pcd_channel(WriteFields& to, const PointCloud& layout, const ChannelInf
     return ascii && alpha ? to.add_packed_rgb(layout, "rgba", ScalarType::u32)
                           : to.add_packed_rgb(layout, "rgb", ScalarType::f32);
   }
-  if (is_channel(c, "normal", 3, {ScalarType::f32})) return to.split(c, {"normal_x", "normal_y", "normal_z"});
+  if (is_normals(c)) return to.split(c, {"normal_x", "normal_y", "normal_z"});
   return to.add(c, c.name);
 }
 

@@ -55,7 +55,7 @@ bool add_ply_channel(WriteFields& to, const ChannelInfo& c) {
   if (ply_type(c.scalar) == nullptr) return false;
   if (is_channel(c, "rgb", 3, {ScalarType::u8, ScalarType::u16}))
     return to.split(c, {"red", "green", "blue"});
-  if (is_channel(c, "normal", 3, {ScalarType::f32})) return to.split(c, {"nx", "ny", "nz"});
+  if (is_normals(c)) return to.split(c, {"nx", "ny", "nz"});
   return c.components == 1 ? to.add(c, c.name) : to.split(c, numbered_names(c));
 }
 

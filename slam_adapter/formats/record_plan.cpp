@@ -11,6 +11,8 @@ namespace {
 using Kind = CoordinateFormat::Kind;
 using Fields = std::vector<RecordField>;
 
+constexpr std::initializer_list<ScalarType> kFloats = {ScalarType::f32, ScalarType::f64};
+
 const RecordField* find_field(const Fields& fields, std::string_view name) {
   const auto it =
       std::find_if(fields.begin(), fields.end(), [&](const RecordField& f) { return f.name == name; });
@@ -87,8 +89,8 @@ class Builder {
 
   bool triple(const RecordField& f) {
     return gather(f, {"red", "green", "blue"}, {ScalarType::u8, ScalarType::u16}, "rgb") ||
-           gather(f, {"normal_x", "normal_y", "normal_z"}, {ScalarType::f32}, "normal") ||
-           gather(f, {"nx", "ny", "nz"}, {ScalarType::f32}, "normal");
+           gather(f, {"normal_x", "normal_y", "normal_z"}, kFloats, "normal") ||
+           gather(f, {"nx", "ny", "nz"}, kFloats, "normal");
   }
   bool gather(const RecordField& first, const std::array<const char*, 3>& names,
               std::initializer_list<ScalarType> types, const char* name) {

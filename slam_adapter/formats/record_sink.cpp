@@ -227,8 +227,7 @@ std::vector<std::string> numbered_names(const ChannelInfo& c) {
 }
 
 bool is_taken_apart(const ChannelInfo& c) {
-  return c.components > 1 && !is_channel(c, "rgb", 3, {ScalarType::u8, ScalarType::u16}) &&
-         !is_channel(c, "normal", 3, {ScalarType::f32});
+  return c.components > 1 && !is_channel(c, "rgb", 3, {ScalarType::u8, ScalarType::u16}) && !is_normals(c);
 }
 
 std::string taken_apart(const ChannelInfo& c) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include "mapcodec/cloud/normals.hpp"
 #include "mapcodec/cloud/point_stream.hpp"
 #include "slam_adapter/formats/file_sink.hpp"
 #include "slam_adapter/formats/formats.hpp"

@@ -258,7 +258,6 @@ class LogMapper {
 
   Status begin_map(const PointCloud& first) {
     CompressOptions options = r_.create;
-    options.store_constants = false;  // what the first keyframe has everywhere, the next may not
     CloudSource source(first);
     auto map = create_map(r_.map, source, options, arena_, settings(), report_.warnings);
     if (!map.ok()) return named(map.error().code == ErrorCode::kCannotWrite ? r_.map : r_.log, map.error());

@@ -70,10 +70,16 @@ class OccupancyMap {
 /// @param changed  only these voxels (OctoMap's keys, as its change detection names them); nullptr: all of
 /// the tree.
 /// Errors: those of MapWriter; InvalidArgument (resolution or kind; the archive's grid of tiles does not
-/// fit).
+/// fit); Unsupported (the map's octree was moved by a pose).
 [[nodiscard]] Result<UpdateReport> update_occupancy_map(const std::string& path, const OccupancyTree& tree,
                                                         double resolution_m, const OccupancyWrite& settings,
                                                         const std::vector<CellCorner>* changed = nullptr);
+
+/// The same as part of the writer's next revision, which is left to the caller. The report's `committed` says
+/// whether there is anything to commit.
+[[nodiscard]] Result<UpdateReport> lay_octree(MapWriter& writer, const OccupancyTree& tree,
+                                              double resolution_m, const OccupancyWrite& settings,
+                                              const std::vector<CellCorner>* changed = nullptr);
 
 /// Whether the archive's tree equals `tree`: leaves, log-odds, colours, inner nodes.
 /// @return what differs first, in a sentence; empty if nothing. Errors: as OccupancyMap.

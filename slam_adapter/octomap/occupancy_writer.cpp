@@ -7,6 +7,7 @@
 #include "mapcodec/codec/occupancy_encoder.hpp"
 #include "parallel/ordered_pipeline.hpp"
 #include "slam_adapter/octomap/occupancy_map.hpp"
+#include "slam_adapter/octomap/octree_target.hpp"
 
 namespace mapcodec {
 namespace {
@@ -43,13 +44,7 @@ Status encode_pieces(const std::vector<OccupancyPiece>& pieces, double resolutio
   return run_ordered(settings.arena, coded.size(), stages, settings.stop, "encoding an octree");
 }
 
-/// Where the octree of an archive stands.
-struct Target {
-  OctreeLayer layer;
-  OctreePlaces places;
-};
-
-Status add_tile(MapWriter& writer, const Target& target, const TileKey& key, const EncodedTile& t) {
+Status add_tile(MapWriter& writer, const OctreeTarget& target, const TileKey& key, const EncodedTile& t) {
   return writer.add(target.places.tile_of(key), static_cast<std::uint8_t>(t.codec), t.points, t.bounds,
                     t.errors, t.bytes, target.layer.submap);
 }
@@ -65,7 +60,7 @@ MapInfo facts(const MapSchema& schema) {
 /// Walks the new tree down to where the map's tiles are.
 class Changes {
  public:
-  Changes(MapWriter& writer, const Target& target, const OccupancyTree& tree, std::uint64_t most,
+  Changes(MapWriter& writer, const OctreeTarget& target, const OccupancyTree& tree, std::uint64_t most,
           const std::vector<CellCorner>* changed)
       : writer_(writer),
         top_(tree),
@@ -203,33 +198,6 @@ Result<OccupancyTree> fitted(const OccupancyTree& tree, double resolution_m, con
   return tree;
 }
 
-/// A submap of its own for the octree of a map of points.
-Result<Target> begin_layer(MapWriter& writer, OccupancyKind kind, double resolution_m) {
-  MapInfo info = writer.info();
-  Target t;
-  t.layer.schema = occupancy_schema(kind, resolution_m);
-  t.places = OctreePlaces(t.layer.schema, info);
-  if (!t.places.fits())
-    return make_error(ErrorCode::kInvalidArgument,
-                      "the octree's voxels do not fit the map's tiles, whose side is " +
-                          std::to_string(info.tile_size_m) + " m");
-  if (info.submaps.empty()) info.submaps.emplace_back();
-  t.layer.submap = static_cast<std::uint32_t>(info.submaps.size());
-  info.submaps.emplace_back().name = "octree";
-  info.extras[kOctreeExtra] = write_octree_layer(t.layer);
-  MAPCODEC_TRY(writer.set_info(std::move(info)));
-  return t;
-}
-
-Result<Target> target_of(MapWriter& writer, OccupancyKind kind, double resolution_m) {
-  MAPCODEC_ASSIGN(MapSchema schema, read_schema(writer.info().schema));
-  if (occupancy_kind(schema)) return Target{{0, std::move(schema)}, {}};
-  MAPCODEC_ASSIGN(std::optional<OctreeLayer> layer, octree_layer(writer.info()));
-  if (!layer) return begin_layer(writer, kind, resolution_m);
-  const OctreePlaces places(layer->schema, writer.info());
-  return Target{std::move(*layer), places};
-}
-
 }  // namespace
 
 Status create_occupancy_map(const std::string& path, const OccupancyTree& tree, double resolution_m,
@@ -237,7 +205,7 @@ Status create_occupancy_map(const std::string& path, const OccupancyTree& tree, 
   std::vector<OccupancyExtra> nodes;
   const std::vector<OccupancyPiece> pieces = cut_tree(tree, most_nodes(settings), nodes);
   if (pieces.empty()) return make_error(ErrorCode::kEmpty, "octree: holds no leaf");
-  const Target target{{0, occupancy_schema(tree.kind, resolution_m)}, {}};
+  const OctreeTarget target{{0, occupancy_schema(tree.kind, resolution_m)}, {}};
   MapInfo info = facts(target.layer.schema);
   MAPCODEC_ASSIGN(MapWriter writer, MapWriter::create(path, info, settings.overwrite));
   MAPCODEC_TRY(encode_pieces(pieces, resolution_m, settings, [&](const TileKey& key, EncodedTile&& t) {
@@ -252,11 +220,9 @@ Status create_occupancy_map(const std::string& path, const OccupancyTree& tree, 
   return revision.ok() ? Status{} : Status(revision.error());
 }
 
-Result<UpdateReport> update_occupancy_map(const std::string& path, const OccupancyTree& tree,
-                                          double resolution_m, const OccupancyWrite& settings,
-                                          const std::vector<CellCorner>* changed) {
-  MAPCODEC_ASSIGN(MapWriter writer, MapWriter::open(path));
-  MAPCODEC_ASSIGN(const Target target, target_of(writer, tree.kind, resolution_m));
+Result<UpdateReport> lay_octree(MapWriter& writer, const OccupancyTree& tree, double resolution_m,
+                                const OccupancyWrite& settings, const std::vector<CellCorner>* changed) {
+  MAPCODEC_ASSIGN(const OctreeTarget target, octree_target(writer, tree.kind, resolution_m));
   MAPCODEC_ASSIGN(const OccupancyTree top, fitted(tree, resolution_m, target.layer.schema));
   Changes changes(writer, target, top, most_nodes(settings), changed);
   MAPCODEC_TRY(changes.run());
@@ -283,8 +249,17 @@ Result<UpdateReport> update_occupancy_map(const std::string& path, const Occupan
   if (!octree_submap(info)) info.input_points += report.points_in;  // of points otherwise
   info.input_bytes += settings.input_bytes;
   MAPCODEC_TRY(writer.set_info(std::move(info)));
-  MAPCODEC_ASSIGN(report.revision, writer.commit(settings.timestamp_s));
   report.committed = true;
+  return report;
+}
+
+Result<UpdateReport> update_occupancy_map(const std::string& path, const OccupancyTree& tree,
+                                          double resolution_m, const OccupancyWrite& settings,
+                                          const std::vector<CellCorner>* changed) {
+  MAPCODEC_ASSIGN(MapWriter writer, MapWriter::open(path));
+  MAPCODEC_ASSIGN(UpdateReport report, lay_octree(writer, tree, resolution_m, settings, changed));
+  if (!report.committed) return report;
+  MAPCODEC_ASSIGN(report.revision, writer.commit(settings.timestamp_s));
   return report;
 }
 

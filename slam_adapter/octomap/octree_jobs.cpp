@@ -56,6 +56,18 @@ Result<OctreeFile> read_octrees(const std::vector<std::string>& paths) {
   return std::move(*all);
 }
 
+Result<std::optional<OctreeFile>> octree_of(const MapFile& map, const ReadSettings& settings) {
+  std::optional<OctreeFile> file;
+  if (!octree_submap(map.archive().info()) && !map.schema().occupancy) return file;
+  MAPCODEC_ASSIGN(const OccupancyMap octree, OccupancyMap::open(map.path(), map.archive().revision()));
+  MAPCODEC_ASSIGN(OccupancyTree tree, octree.read({}, settings));
+  if (tree.root == Cell::unknown) return file;
+  file.emplace();
+  file->tree = std::move(tree);
+  file->resolution_m = octree.resolution_m();
+  return file;
+}
+
 Result<CompressReport> compress_octrees(const std::vector<std::string>& inputs, const std::string& path,
                                         const CompressOptions& options) {
   const auto begin = Clock::now();

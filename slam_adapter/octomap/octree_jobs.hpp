@@ -15,6 +15,9 @@ namespace mapcodec {
 /// Errors: those of read_octree; InvalidArgument (resolutions or kinds differ).
 [[nodiscard]] Result<OctreeFile> read_octrees(const std::vector<std::string>& paths);
 
+/// The octree of an archive, if it holds one, alone or beside points. Errors: those of OccupancyMap.
+[[nodiscard]] Result<std::optional<OctreeFile>> octree_of(const MapFile& map, const ReadSettings& settings);
+
 /// Octrees into a new archive. Errors: as read_octrees and create_occupancy_map.
 [[nodiscard]] Result<CompressReport> compress_octrees(const std::vector<std::string>& inputs,
                                                       const std::string& path,

@@ -20,8 +20,8 @@ Status check_still(const std::string& name, const Vec3& translation_m,
       ErrorCode::kUnsupported,
       "submap '" + name +
           "' holds an octree, which lies on its own grid and cannot be moved: leave its pose at "
-          "0,0,0,0,0,0,1, and after a correction make a new octree of the points (decompress "
-          "--as bt, then update)");
+          "0,0,0,0,0,0,1 (the verb pose sets it back), and after a correction make a new octree of the "
+          "points (decompress --as bt, then update)");
 }
 
 }  // namespace
@@ -61,6 +61,15 @@ Status check_octree_pose(const MapInfo& info, std::span<const PoseChange> change
       MAPCODEC_TRY(check_still(info.submaps[c.submap].name, c.translation_m, c.rotation_xyzw));
   }
   return {};
+}
+
+Status check_holds_points(const MapInfo& info, std::uint32_t submap) {
+  if (octree_submap(info) != submap) return {};
+  const std::string name = submap < info.submaps.size() ? info.submaps[submap].name : "";
+  return make_error(ErrorCode::kUnsupported,
+                    "submap '" + name +
+                        "' holds an octree and takes no points: give the points' submap another name, or "
+                        "update with a .bt or .ot");
 }
 
 Bytes write_octree_layer(const OctreeLayer& layer) {

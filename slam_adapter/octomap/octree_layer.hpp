@@ -31,6 +31,9 @@ struct OctreeLayer {
 /// Whether poses may be set so; back to the identity always.
 [[nodiscard]] Status check_octree_pose(const MapInfo& info, std::span<const PoseChange> changes);
 
+/// Errors: Unsupported (that submap holds an octree, so no points go there).
+[[nodiscard]] Status check_holds_points(const MapInfo& info, std::uint32_t submap);
+
 /// Between the keys of an octree's subtrees and those of the tiles that hold them. In an archive of octrees
 /// alone they are the same. Else a subtree takes the cell of the map's grid where its centre lies, of the
 /// largest side that is not above its own: no two meet, and bounds are told as closely as for points.

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <map>
 
+#include "mapcodec/cloud/normals.hpp"
 #include "slam_adapter/formats/record_source.hpp"
 #include "slam_adapter/rosbag/bag_poses.hpp"
 #include "slam_adapter/rosbag/cloud_message.hpp"
@@ -87,6 +88,9 @@ class Scans final : public BagScans {
     std::vector<std::string> r = bag_.warnings;
     r.insert(r.end(), warnings_.begin(), warnings_.end());
     if (poses_) r.insert(r.end(), poses_->warnings().begin(), poses_->warnings().end());
+    if (const auto name = unturned_normals(layout_); name && poses_)
+      r.push_back("the channel " + *name +
+                  " stays as it is: only \"normal\" of three floats or doubles turns with the poses");
     const std::string of = " of " + std::to_string(seen_) + " clouds ";
     if (without_pose_ > 0)
       r.push_back(std::to_string(without_pose_) + of + "have no pose at their time and are left out");

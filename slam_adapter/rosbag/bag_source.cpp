@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "mapcodec/cloud/normals.hpp"
 #include "slam_adapter/formats/record_source.hpp"
 #include "slam_adapter/rosbag/bag_scans.hpp"
 
@@ -6,17 +7,6 @@ namespace mapcodec {
 namespace {
 
 constexpr std::size_t kBlockPoints = 65536;
-
-void turn_normals(PointCloud& cloud, const ScanPose& pose) {
-  Channel* normal = cloud.find("normal");
-  if (normal == nullptr || normal->info.scalar != ScalarType::f32 || normal->info.components != 3) return;
-  for (std::size_t i = 0; i < cloud.size(); ++i) {
-    Vec3 v;
-    for (std::size_t d = 0; d < 3; ++d) v[d] = normal->get<float>(i, d);
-    v = pose.rotate(v);
-    for (std::size_t d = 0; d < 3; ++d) normal->set(i, static_cast<float>(v[d]), d);
-  }
-}
 
 class BagSource final : public NamedSource {
  public:
@@ -76,7 +66,8 @@ class BagSource final : public NamedSource {
       for (double& v : p) v *= options_.unit_m;
       if (scan_.T_map_sensor) p = scan_.T_map_sensor->apply(p);
     }
-    if (scan_.T_map_sensor) turn_normals(points, *scan_.T_map_sensor);
+    if (scan_.T_map_sensor)
+      turn_normals(points, [&](const Vec3& n) { return scan_.T_map_sensor->rotate(n); });
     return true;
   }
 

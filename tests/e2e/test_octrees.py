@@ -140,6 +140,18 @@ class Octrees(ProgramTest):
         self.succeeds("pose", archive, "--submap", "octree", "--pose", "0,0,0,0,0,0,1")
         self.assertEqual(self.decompress(archive, name="out.bt").read_bytes(), octree.read_bytes())
 
+    def test_merged_and_flattened(self):
+        points, octree = write(self.path("in.pcd"), pcd_bytes(room(2000, RGB))), write(self.path("a.bt"), small_bt())
+        both = self.compress(points, name="both.mapc")
+        self.succeeds("update", both, octree)
+        self.fails(BAD_INPUT, "update", both, points, "--submap", "octree", says="takes no points")
+        grown = self.compress(points, name="grown.mapc")
+        self.succeeds("merge", grown, both)
+        self.succeeds("flatten", both, "-o", self.path("flat.mapc"))
+        for archive in (grown, self.path("flat.mapc")):
+            self.succeeds("verify", archive, "--against", octree)
+            self.assertGreater(self.succeeds("info", archive, "--json").json["points"], 1999)
+
     def test_bad_files(self):
         good = small_bt()
         for name, data in {"cut.bt": good[:-3], "count.bt": good.replace(b"size ", b"size 9"), "empty.bt": b"",

@@ -6,6 +6,7 @@ import unittest
 
 from daemon import Daemon
 from program import BAD_INPUT, USAGE, ProgramTest
+from test_octrees import small_bt
 
 UNREACHABLE = 6
 
@@ -72,6 +73,19 @@ class Verbs(ProgramTest):
         self.succeeds("compress", write_xyz(self.path("b.xyz"), 2), "-o", other, "--max-error", "0.01")
         self.json_of("merge", self.url, other)
         self.assertGreater(self.json_of("info", self.url)["points"], 3000)
+
+    def test_octrees_stay_at_home(self):
+        self.begin()
+        octree = self.path("a.bt")
+        octree.write_bytes(small_bt())
+        alone, beside = self.path("alone.mapc"), self.path("beside.mapc")
+        self.succeeds("compress", octree, "-o", alone)
+        self.succeeds("compress", write_xyz(self.path("b.xyz"), 2), "-o", beside, "--max-error", "0.01")
+        self.succeeds("update", beside, octree)
+        self.fails(BAD_INPUT, "merge", self.url, alone, says="octree alone")
+        merged = self.json_of("merge", self.url, beside)
+        self.assertEqual(merged["points_in"], 3000)
+        self.assertIn("octree is left out", " ".join(merged["warnings"]))
 
     def test_sync_brings_a_copy_up_to_date(self):
         self.begin()

@@ -84,6 +84,19 @@ TEST(RoundTrip, AllFormatsWithTypedChannels) {
   }
 }
 
+TEST(RoundTrip, NormalsOfDoubles) {
+  Folder folder;
+  for (const char* name : {"a.pcd", "a.ply", "a.vtk", "a.xyz"}) {
+    SCOPED_TRACE(name);
+    const PointCloud cloud = make_cloud(kF64, {{"normal", ScalarType::f64, 3}}, 200, 10);
+    EXPECT_TRUE(unwritten_channels(folder / name, cloud.like()).empty());
+    ASSERT_TRUE(write_cloud(folder / name, cloud).ok());
+    const auto back = drain(open_source(folder / name));
+    ASSERT_TRUE(back.status.ok()) << message(back);
+    expect_same(cloud, back.cloud, Kind::f64);
+  }
+}
+
 TEST(RoundTrip, OnePointAndNoChannel) {
   Folder folder;
   for (const char* name : {"a.pcd", "a.ply", "a.las", "a.xyz", "a.txt", "a.pts", "a.bin", "a.vtk"}) {

@@ -100,12 +100,17 @@ TEST(Evaluation, DirectionsDiffer) {
 }
 
 TEST(Evaluation, NormalsOfTheFileAreUsed) {
-  PointCloud a = points({{0, 0, 0}, {1, 0, 0}});
-  Channel normal = zero_channel("normal", ScalarType::f32, 3, 2);
-  for (std::size_t i = 0; i < 2; ++i) normal.set<float>(i, 2.0F, 1);  // along y, not of unit length
-  a.channels.push_back(normal);
-  const Evaluation e = measure(a, points({{0, 0.1, 0.3}, {1, 0.1, 0.3}}));
-  EXPECT_NEAR(e.d2_psnr_db, 10 * std::log10(3 / 0.01), 1e-9);
+  for (const ScalarType scalar : {ScalarType::f32, ScalarType::f64}) {
+    PointCloud a = points({{0, 0, 0}, {1, 0, 0}});
+    Channel normal = zero_channel("normal", scalar, 3, 2);
+    for (std::size_t i = 0; i < 2; ++i) {  // along y, not of unit length
+      if (scalar == ScalarType::f32) normal.set<float>(i, 2.0F, 1);
+      if (scalar == ScalarType::f64) normal.set<double>(i, 2.0, 1);
+    }
+    a.channels.push_back(normal);
+    const Evaluation e = measure(a, points({{0, 0.1, 0.3}, {1, 0.1, 0.3}}));
+    EXPECT_NEAR(e.d2_psnr_db, 10 * std::log10(3 / 0.01), 1e-9);
+  }
 }
 
 TEST(Evaluation, SixteenBitColorsAreScaled) {

@@ -158,6 +158,55 @@ TEST(RosBag, EveryTypeEveryEndPaddingAndColour) {
   }
 }
 
+/// Seen by a lidar that is turned by 90 degrees about z: a normal along x, in the fields given.
+std::string bag_with_normals(const std::vector<Field>& fields, const std::string& values) {
+  constexpr std::int64_t kTime = 1'700'000'000'000'000'000;
+  const double r = std::sqrt(0.5);
+  Cloud c;
+  c.stamp_ns = kTime;
+  c.width = 1;
+  for (int i = 0; i < 3; ++i) put(c.data, 1.0F);
+  c.data += values;
+  c.point_step = static_cast<std::uint32_t>(c.data.size());
+  c.fields.insert(c.fields.end(), fields.begin(), fields.end());
+  BagWriter bag;
+  bag.add_chunk({tf({{"map", "lidar", kTime, {{0, 0, 0}, {0, 0, r, r}}}}, true), cloud(c)});
+  return bag.finish();
+}
+
+TEST(RosBag, NormalsOfFloatsAndDoublesTurn) {
+  std::string floats, doubles;
+  for (const float v : {1.0F, 0.0F, 0.0F}) put(floats, v);
+  for (const double v : {1.0, 0.0, 0.0}) put(doubles, v);
+  const std::vector<std::pair<std::vector<Field>, std::string>> forms = {
+      {{{"normal_x", 12, 7}, {"normal_y", 16, 7}, {"normal_z", 20, 7}}, floats},
+      {{{"normal_x", 12, 8}, {"normal_y", 20, 8}, {"normal_z", 28, 8}}, doubles},
+      {{{"nx", 12, 8}, {"ny", 20, 8}, {"nz", 28, 8}}, doubles},
+      {{{"normal", 12, 8, 3}}, doubles}};
+  for (const auto& [fields, values] : forms) {
+    const ReadBack r = read_bag(bag_with_normals(fields, values));
+    ASSERT_EQ(r.cloud.size(), 1u) << message(r);
+    const Channel* normal = r.cloud.find("normal");
+    ASSERT_NE(normal, nullptr) << fields.front().name;
+    ASSERT_EQ(normal->info.components, 3);
+    const bool wide = normal->info.scalar == ScalarType::f64;
+    for (std::size_t d = 0; d < 3; ++d) {
+      const double v = wide ? normal->get<double>(0, d) : double(normal->get<float>(0, d));
+      EXPECT_NEAR(v, d == 1 ? 1 : 0, wide ? 1e-12 : 1e-6) << fields.front().name;
+    }
+    for (const std::string& w : r.warnings) EXPECT_EQ(w.find("stays as it is"), std::string::npos) << w;
+  }
+}
+
+TEST(RosBag, NormalsThatDoNotTurnAreNamed) {
+  const ReadBack r = read_bag(bag_with_normals({{"normal", 12, 1, 3}}, std::string("\x7f\0\0", 3)));
+  ASSERT_EQ(r.cloud.size(), 1u) << message(r);
+  EXPECT_EQ(r.cloud.find("normal")->get<std::int8_t>(0, 0), 127);
+  EXPECT_TRUE(std::any_of(r.warnings.begin(), r.warnings.end(), [](const std::string& w) {
+    return w.find("the channel normal stays as it is") != std::string::npos;
+  }));
+}
+
 TEST(RosBag, NanAreDroppedAndCounted) {
   const ReadBack r = read_bag(one_cloud(xyz_cloud({{1, 2, 3}, {NAN, 0, 0}, {4, 5, 6}}, 5)));
   EXPECT_EQ(r.cloud.size(), 2u);

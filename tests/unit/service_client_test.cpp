@@ -13,7 +13,9 @@
 #include "slam_adapter/client/remote_map.hpp"
 #include "slam_adapter/client/remote_store.hpp"
 #include "slam_adapter/client/scan_sender.hpp"
+#include "slam_adapter/octomap/occupancy_map.hpp"
 #include "slam_adapter/updater_coding.hpp"
+#include "tests/unit/occupancy_support.hpp"
 #include "tools/mapcodecd/grpc/server.hpp"
 
 namespace mapcodec {
@@ -123,6 +125,23 @@ TEST_F(ServiceClient, CallsAndTheirErrors) {
   ASSERT_TRUE(client_->compact(1).ok());
   stop();
   EXPECT_EQ(client_->stats().error().code, ErrorCode::kUnreachable);
+}
+
+TEST_F(ServiceClient, AnOctreeIsNotMoved) {
+  send(1, 3000);
+  stop();
+  const std::string archive = (folder_ / "maps/m.mapc").string();
+  ASSERT_TRUE(update_occupancy_map(archive, test::bubble(OccupancyKind::binary, 4), 0.1, {}).ok());
+  start();
+  const auto before = bytes_of(archive);
+  PoseChange moved;
+  moved.translation_m = {1, 0, 0};
+  const auto refused = client_->set_poses({{"octree", moved}});
+  EXPECT_EQ(refused.error().code, ErrorCode::kUnsupported);
+  EXPECT_NE(refused.error().message.find("holds an octree, which lies on its own grid"), std::string::npos)
+      << refused.error().message;
+  EXPECT_EQ(bytes_of(archive), before);
+  EXPECT_TRUE(client_->set_poses({{"octree", {}}}).ok());
 }
 
 TEST_F(ServiceClient, AnArchiveIsReadFromAfar) {

@@ -219,6 +219,66 @@ TEST_P(LivingByRms, AMapBegunAsACompressedScanKeepsItsRecord) {
   check();
 }
 
+/// How far the decoded points of the map's tiles reach beyond the plane x = `border` [m], from the left and
+/// from the right.
+std::pair<double, double> overlap(const std::string& path, double border) {
+  const auto map = MapFile::open(path);
+  EXPECT_TRUE(map.ok());
+  std::pair<double, double> reach{-1, -1};
+  for (std::size_t i = 0; i < map->archive().tiles().size(); ++i) {
+    const TileRecord& tile = map->archive().tiles()[i];
+    EXPECT_EQ(tile.codec, static_cast<std::uint8_t>(CodecId::surface));
+    const Box cube = tile_cube(tile.key, map->schema().origin, map->schema().tile_size_m);
+    const bool left = cube.max[0] < border + 0.1;
+    const PointCloud cloud = map->read_tile(i).value();
+    for (const Vec3& q : cloud.xyz) {
+      double& far = left ? reach.first : reach.second;
+      far = std::max(far, left ? q[0] - border : border - q[0]);
+    }
+  }
+  return reach;
+}
+
+TEST_P(LivingByRms, SurfacesOfFoldedTilesGoOnWhereTilesLieBesideThem) {
+  std::mt19937 random(3);
+  const auto uniform = [&](double a, double b) { return a + (b - a) * double(random()) / 4294967296.0; };
+  PointCloud both;
+  for (int i = 0; i < 80000; ++i)
+    both.xyz.push_back({uniform(0.1, 7.9), uniform(0.1, 3.9), uniform(1, 1.005)});
+  CompressOptions o = options();
+  o.promise_m = 0.03;
+  const auto build = [&](const std::vector<PointCloud>& scans, int threads) {
+    std::filesystem::remove(path_);
+    Arena arena(threads);
+    CloudSource first(both);
+    std::vector<std::string> warnings;
+    auto map = create_map(path_, first, o, arena, {}, warnings);
+    ASSERT_TRUE(map.ok()) << map.error().message;
+    for (const PointCloud& scan : scans) {
+      ASSERT_TRUE(map->insert(scan).ok());
+      ASSERT_TRUE(map->fold().ok());
+    }
+    ASSERT_TRUE(map->commit(7).ok());
+  };
+  build({both}, 2);
+  const MapSchema schema = MapFile::open(path_)->schema();
+  const double border =
+      schema.origin[0] + schema.tile_size_m * std::round((4 - schema.origin[0]) / schema.tile_size_m);
+  const auto bytes = file();
+  const auto at_once = overlap(path_, border);
+  EXPECT_GT(at_once.first, 0.001);
+  EXPECT_GT(at_once.second, 0.001);
+  build({both}, 1);
+  EXPECT_EQ(file(), bytes);
+  // What was coded for good before its neighbour came stays as it is; what comes goes on into it.
+  PointCloud left, right;
+  for (const Vec3& p : both.xyz) (p[0] < border ? left : right).xyz.push_back(p);
+  build({left, right}, 2);
+  const auto later = overlap(path_, border);
+  EXPECT_LT(later.first, at_once.first);
+  EXPECT_GT(later.second, 0.001);
+}
+
 TEST_P(Living, SameBytesOnAnyNumberOfThreads) {
   Bytes bytes[2];
   for (const int threads : {1, 2}) {

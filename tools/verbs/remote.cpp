@@ -9,6 +9,7 @@
 #include "slam_adapter/client/scan_sender.hpp"
 #include "slam_adapter/formats/formats.hpp"
 #include "slam_adapter/map_file.hpp"
+#include "slam_adapter/octomap/octree_layer.hpp"
 #include "slam_adapter/point_batch.hpp"
 #include "tools/verbs/report.hpp"
 
@@ -132,9 +133,15 @@ Result<UpdateReport> merge_remote(const std::string& map, const MergeRequest& r,
   UpdateReport report;
   for (const std::string& path : r.others) {
     MAPCODEC_ASSIGN(const MapFile other, MapFile::open(path));
+    const auto octree = octree_submap(other.archive().info());
+    if (other.schema().occupancy)
+      return make_error(ErrorCode::kUnsupported,
+                        path + ": is a map of an octree alone: a service takes points");
+    if (octree) warnings.push_back(path + ": its octree is left out: a service takes points");
     say_unkept(path, other.schema().layout(), schema, warnings);
     for (std::size_t i = 0; i < other.archive().tiles().size(); ++i) {
       const std::uint32_t number = other.archive().tiles()[i].submap;
+      if (number == octree) continue;
       const auto& submaps = other.archive().info().submaps;
       const bool apart = !r.fuse && number < submaps.size() && !submaps[number].name.empty();
       Scan scan;
