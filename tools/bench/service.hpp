@@ -41,8 +41,9 @@ struct LoadResult {
   double seconds = 0, points_per_second = 0;
   std::uint64_t revisions = 0, tiles_read = 0, bytes_read = 0;
   double daemon_cores = 0;
-  std::vector<double> waits_s;      ///< from a scan's sending until it is durable
-  std::vector<double> resident_mb;  ///< each second
+  std::vector<double> waits_s;                    ///< from a scan's sending until it is durable
+  std::vector<double> resident_mb;                ///< each second
+  std::vector<double> stored_points, archive_mb;  ///< of the map, each second
   std::vector<std::string> faults;
 };
 /// Writers put scans of a spinning lidar in while readers pull tiles.

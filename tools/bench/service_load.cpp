@@ -112,6 +112,7 @@ Result<LoadResult> run_load(ChildDaemon& daemon, const std::string& map, const P
   Shared shared;
   std::vector<std::thread> threads;
   const double cpu = daemon.cpu_seconds();
+  MAPCODEC_ASSIGN(const MapClient client, MapClient::connect(url));
   const Watch watch(Watch::Kind::wall);
   for (int i = 0; i < settings.writers; ++i)
     threads.emplace_back([&, i] {
@@ -125,6 +126,10 @@ Result<LoadResult> run_load(ChildDaemon& daemon, const std::string& map, const P
   while (!shared.stop && watch.seconds() < settings.seconds) {
     std::this_thread::sleep_for(std::chrono::seconds(1));
     shared.result.resident_mb.push_back(daemon.resident_mb());
+    const auto stats = client.stats();
+    if (!stats.ok()) continue;
+    shared.result.stored_points.push_back(double(stats->points));
+    shared.result.archive_mb.push_back(double(stats->file_bytes) / 1e6);
   }
   shared.stop = true;
   for (std::thread& t : threads) t.join();
@@ -134,7 +139,6 @@ Result<LoadResult> run_load(ChildDaemon& daemon, const std::string& map, const P
   r.tiles_read = shared.tiles;
   r.bytes_read = shared.bytes;
   r.daemon_cores = (daemon.cpu_seconds() - cpu) / r.seconds;
-  MAPCODEC_ASSIGN(const MapClient client, MapClient::connect(url));
   MAPCODEC_ASSIGN(const MapStats stats, client.stats());
   r.revisions = stats.revision;
   return r;

@@ -83,6 +83,29 @@ Status measure_load(const BenchSettings& settings, const PointCloud& scan, Repor
   return {};
 }
 
+/// Memory, and the map that it is for, in parts of the time.
+void report_parts(Report& report, const LoadResult& r) {
+  report.line(
+      "\n| part of the soak | MB, median | MB, most | M points in the map | MB of archive "
+      "|\n|---|---|---|---|---|");
+  constexpr std::size_t kParts = 6;
+  for (std::size_t part = 0; part < kParts; ++part) {
+    const auto share = [&](const std::vector<double>& values, double q) {
+      const auto at = [&](std::size_t k) {
+        return values.begin() + std::ptrdiff_t(values.size() * k / kParts);
+      };
+      const std::vector<double> some(at(part), at(part + 1));
+      return some.empty() ? 0.0 : quantile(some, q);
+    };
+    const double middle = share(r.resident_mb, 0.5), most = share(r.resident_mb, 1),
+                 points = share(r.stored_points, 0.5), archive = share(r.archive_mb, 0.5);
+    report.row({fmt::format("{} of {}", part + 1, kParts), digits(middle), digits(most), digits(points / 1e6),
+                digits(archive)});
+    report.json()["soak"]["parts"].push_back(
+        {{"median_mb", middle}, {"most_mb", most}, {"points", points}, {"archive_mb", archive}});
+  }
+}
+
 /// Mixed load for minutes over places that come again: the map, and memory, should stay as they are.
 Status measure_soak(const BenchSettings& settings, const PointCloud& scan, Report& report) {
   const std::string folder = report.scratch() + ".daemon";
@@ -99,19 +122,7 @@ Status measure_soak(const BenchSettings& settings, const PointCloud& scan, Repor
   report.table(kHead);
   row_of(report, "4 writers at 1 Hz, 8 readers at 2 Hz", r);
   report.json()["soak"] = json_of(r);
-  report.line("\n| part of the soak | MB, median | MB, most |\n|---|---|---|");
-  constexpr std::size_t kParts = 6;
-  for (std::size_t part = 0; part < kParts; ++part) {
-    const auto at = [&](std::size_t k) {
-      return r.resident_mb.begin() + std::ptrdiff_t(r.resident_mb.size() * k / kParts);
-    };
-    const std::vector<double> some(at(part), at(part + 1));
-    if (some.empty()) continue;
-    report.row(
-        {fmt::format("{} of {}", part + 1, kParts), digits(quantile(some, 0.5)), digits(quantile(some, 1))});
-    report.json()["soak"]["parts"].push_back(
-        {{"median_mb", quantile(some, 0.5)}, {"most_mb", quantile(some, 1)}});
-  }
+  report_parts(report, r);
   Plot plot;
   plot.title = "resident memory of mapcodecd";
   plot.x_label = "s";
