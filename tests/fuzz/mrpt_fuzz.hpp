@@ -1,74 +1,138 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // MRPT's files through the door that the program uses: a child that MRPT may break, and a parent that must
-// not. The child is forked here instead of started anew, which takes too long.
+// not. The child is forked here, and stays for many files: MRPT's registers, and a fork with a sanitizer's
+// tables, take longer than a file. What the fuzzer counts in the child it sees in memory that both share.
 #pragma once
 
 #include <sys/mman.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <csignal>
 #include <cstdint>
 #include <cstdlib>
+#include <cstring>
+#include <optional>
 #include <string>
 
 #include "slam_adapter/mrpt/reader_process.hpp"
 #include "slam_adapter/mrpt/serve.hpp"
 
-namespace mapcodec::fuzz {
-
 #if defined(__SANITIZE_ADDRESS__)
-constexpr bool kSanitized = true;
+#define MAPCODEC_FUZZ_ASAN
 #elif defined(__has_feature)
 #if __has_feature(address_sanitizer)
-constexpr bool kSanitized = true;
-#else
-constexpr bool kSanitized = false;
+#define MAPCODEC_FUZZ_ASAN
 #endif
-#else
-constexpr bool kSanitized = false;
+#if __has_feature(coverage_sanitizer)
+#define MAPCODEC_FUZZ_COUNTERS
+#endif
 #endif
 
-/// As the reading program, but for the sanitizer's own address space.
+#ifdef MAPCODEC_FUZZ_ASAN
+extern "C" int __sanitizer_install_malloc_and_free_hooks(void (*)(const volatile void*, std::size_t),
+                                                         void (*)(const volatile void*));
+extern "C" void __sanitizer_set_death_callback(void (*)());
+#endif
+#ifdef MAPCODEC_FUZZ_COUNTERS
+extern "C" std::uint8_t __start___sancov_cntrs[], __stop___sancov_cntrs[];
+#endif
+
+namespace mapcodec::fuzz {
+
+constexpr std::uint64_t kReaderMemory = std::uint64_t{3} << 30;
+constexpr int kFilesOfAChild = 2000;  // then a new one: MRPT loses memory where it throws
+inline bool is_child = false;
+
+#ifdef MAPCODEC_FUZZ_ASAN
+/// The sanitizer's own address space forbids a limit of it, and libFuzzer, whose hook would come first if
+/// this were installed later, would take a large request for a finding.
+inline const int kHooked = __sanitizer_install_malloc_and_free_hooks(
+    [](const volatile void*, std::size_t size) {
+      if (is_child && size > kReaderMemory) ::_exit(3);
+    },
+    [](const volatile void*) {});
+#endif
+
+/// Whole pages alone: beside the counters lies what must not be shared.
+inline void share_counters() {
+#ifdef MAPCODEC_FUZZ_COUNTERS
+  const auto page = static_cast<std::uintptr_t>(::sysconf(_SC_PAGESIZE));
+  const auto begin = (reinterpret_cast<std::uintptr_t>(__start___sancov_cntrs) + page - 1) / page * page;
+  const auto end = reinterpret_cast<std::uintptr_t>(__stop___sancov_cntrs) / page * page;
+  if (begin >= end) return;
+  auto* at = reinterpret_cast<std::uint8_t*>(begin);
+  const Bytes kept(at, at + (end - begin));
+  if (::mmap(at, kept.size(), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS | MAP_FIXED, -1, 0) != at)
+    std::abort();
+  std::memcpy(at, kept.data(), kept.size());
+#endif
+}
+
+/// As the reading program, once for every byte that comes.
 [[noreturn]] inline void be_the_reader(const std::string& path, int fd) {
-  if (!kSanitized) (void)limit_process(std::uint64_t{3} << 30);
-  ::alarm(100);
+  is_child = true;
+  // Its death is no finding: neither the sanitizer nor a signal tells the fuzzer.
+  for (const int s : {SIGALRM, SIGABRT, SIGINT, SIGTERM}) std::signal(s, SIG_DFL);
+#ifdef MAPCODEC_FUZZ_ASAN
+  __sanitizer_set_death_callback(nullptr);
+#else
+  (void)limit_process(kReaderMemory);
+#endif
   ::close(STDERR_FILENO);
-  serve_log(path, {}, fd);
+  char go = 0;
+  while (::read(fd, &go, 1) == 1) {
+    ::alarm(10);
+    serve_log(path, {}, fd);
+    ::alarm(0);
+  }
   ::_exit(0);
 }
 
-/// As RawlogReader: every message is looked at.
-inline void be_the_asker(MessagePipe pipe) {
+/// As RawlogReader: every message is looked at. False: the child is gone.
+inline bool be_the_asker(MessagePipe& pipe) {
   for (;;) {
     const auto m = pipe.read();
-    if (!m.ok()) return;
+    if (!m.ok()) return false;
     if (m->kind == WireKind::frame) {
       const auto frame = read_frame(m->payload);
       if (!frame.ok()) std::abort();  // our own reader wrote it
     } else if (m->kind == WireKind::error) {
       const Error error = read_error(m->payload);
       if (error.message.empty()) std::abort();
-      return;
+      return true;
     } else {
       if (!read_summary(m->payload).ok()) std::abort();
-      return;
+      return true;
     }
   }
 }
 
-inline int run(const std::uint8_t* data, std::size_t size, const char* name) {
-  const int file = ::memfd_create(name, 0);
-  if (file < 0 || ::write(file, data, size) != static_cast<ssize_t>(size)) return 0;
+inline MessagePipe start_reader(int file) {
   int ends[2];
   if (::socketpair(AF_UNIX, SOCK_STREAM, 0, ends) != 0) std::abort();
   const pid_t child = ::fork();
+  if (child < 0) std::abort();
   if (child == 0) {
     ::close(ends[0]);
     be_the_reader("/proc/self/fd/" + std::to_string(file), ends[1]);
   }
   ::close(ends[1]);
-  be_the_asker(MessagePipe(ends[0], -1, child));
-  ::close(file);
+  return MessagePipe(ends[0], ends[0], child);
+}
+
+inline int run(const std::uint8_t* data, std::size_t size, const char* name) {
+  static const int file = (share_counters(), ::memfd_create(name, 0));
+  static std::optional<MessagePipe> pipe;
+  static int files = 0;
+  if (file < 0 || ::ftruncate(file, 0) != 0 || ::pwrite(file, data, size, 0) != static_cast<ssize_t>(size))
+    std::abort();
+  if (!pipe || ++files > kFilesOfAChild) {
+    pipe.emplace(start_reader(file));
+    files = 0;
+  }
+  const std::uint8_t go[] = {1};
+  if (!pipe->write(go).ok() || !be_the_asker(*pipe)) pipe.reset();
   return 0;
 }
 
