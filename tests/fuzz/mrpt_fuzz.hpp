@@ -35,7 +35,12 @@ extern "C" int __sanitizer_install_malloc_and_free_hooks(void (*)(const volatile
 extern "C" void __sanitizer_set_death_callback(void (*)());
 #endif
 #ifdef MAPCODEC_FUZZ_COUNTERS
-extern "C" std::uint8_t __start___sancov_cntrs[], __stop___sancov_cntrs[];
+// The linker's names of where they begin and end. In C++ they cannot be declared: Clang declares them itself,
+// and would rename its own.
+__asm__(
+    ".pushsection .data.rel,\"aw\"\n.balign 8\n.globl mapcodec_fuzz_counters\n"
+    "mapcodec_fuzz_counters: .quad __start___sancov_cntrs, __stop___sancov_cntrs\n.popsection");
+extern "C" std::uint8_t* const mapcodec_fuzz_counters[2];
 #endif
 
 namespace mapcodec::fuzz {
@@ -58,8 +63,8 @@ inline const int kHooked = __sanitizer_install_malloc_and_free_hooks(
 inline void share_counters() {
 #ifdef MAPCODEC_FUZZ_COUNTERS
   const auto page = static_cast<std::uintptr_t>(::sysconf(_SC_PAGESIZE));
-  const auto begin = (reinterpret_cast<std::uintptr_t>(__start___sancov_cntrs) + page - 1) / page * page;
-  const auto end = reinterpret_cast<std::uintptr_t>(__stop___sancov_cntrs) / page * page;
+  const auto begin = (reinterpret_cast<std::uintptr_t>(mapcodec_fuzz_counters[0]) + page - 1) / page * page;
+  const auto end = reinterpret_cast<std::uintptr_t>(mapcodec_fuzz_counters[1]) / page * page;
   if (begin >= end) return;
   auto* at = reinterpret_cast<std::uint8_t*>(begin);
   const Bytes kept(at, at + (end - begin));
