@@ -8,6 +8,8 @@
 #include <mrpt/obs/CObservationRotatingScan.h>
 #include <mrpt/obs/CObservationVelodyneScan.h>
 
+#include <cstring>
+
 #include "slam_adapter/mrpt/mrpt_pose.hpp"
 #include "slam_adapter/mrpt/points_map.hpp"
 
@@ -29,13 +31,20 @@ void push(Channel& c, T value) {
   c.set(c.size() - 1, value);
 }
 
+/// MRPT reads flags as bytes: in a damaged file one may be neither false nor true, which no bool may be.
+bool is_set(const bool& flag) {
+  unsigned char byte = 0;
+  std::memcpy(&byte, &flag, 1);
+  return byte != 0;
+}
+
 std::string scan_2d(const CObservation2DRangeScan& o, const ProjectionSettings& s, RawlogFrame& f) {
   f.planar = true;
   const bool shines = o.hasIntensity();
   if (shines) add_layout(f.points, kIntensity);
   if (s.layout_alone) return {};
   const double step = o.getScanSize() > 1 ? double(o.aperture) / double(o.getScanSize() - 1) : 0;
-  const double turn = o.rightToLeft ? 1 : -1;
+  const double turn = is_set(o.rightToLeft) ? 1 : -1;
   for (std::size_t i = 0; i < o.getScanSize(); ++i) {
     const double range = double(o.getScanRange(i));
     if (!o.getScanRangeValidity(i) || !(range > 0) || !(range < double(o.maxRange))) continue;
@@ -47,12 +56,12 @@ std::string scan_2d(const CObservation2DRangeScan& o, const ProjectionSettings& 
 }
 
 std::string range_image(CObservation3DRangeScan& o, const ProjectionSettings& s, RawlogFrame& f) {
-  if (!o.hasRangeImage && !o.hasPoints3D) return "no range image and no points";
-  const bool colored = o.hasRangeImage && o.hasIntensityImage;
+  if (!is_set(o.hasRangeImage) && !is_set(o.hasPoints3D)) return "no range image and no points";
+  const bool colored = is_set(o.hasRangeImage) && is_set(o.hasIntensityImage);
   if (colored) add_layout(f.points, kRgb);
   if (s.layout_alone) return {};
   o.load();
-  if (!o.hasRangeImage) {
+  if (!is_set(o.hasRangeImage)) {
     const std::size_t n = std::min({o.points3D_x.size(), o.points3D_y.size(), o.points3D_z.size()});
     for (std::size_t i = 0; i < n; ++i)
       f.points.xyz.push_back({double(o.points3D_x[i]), double(o.points3D_y[i]), double(o.points3D_z[i])});
