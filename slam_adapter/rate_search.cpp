@@ -94,11 +94,11 @@ Status RateSearch::seek_whole(CodingPlan& plan, const MapSchema& schema, double 
   slope = search.rms_slope();
   leapt_ = search.leapt();
   surfaces_alone_ = surfaces_alone_ && search.surfaces_alone();
-  found_ = best ? best->sum : search.last();
-  if (best) {
-    plan = best->plan;
-    coded_ = std::move(best->coded);
-  }
+  // Where no try kept the promise, the nearest step will do: the map's own coding goes on from there.
+  if (!best) return seek_on(sample_, plan, schema, &CodedSum::rms_m, kRmsAim * rms_m, steps, slope);
+  found_ = best->sum;
+  plan = best->plan;
+  coded_ = std::move(best->coded);
   expected_bits_ = found_.geometry_bits_per_point();
   return {};
 }

@@ -28,7 +28,6 @@ class WholeSearch {
   /// Errors: those of encoding; Cancelled.
   [[nodiscard]] Result<std::optional<Kept>> run(CodingPlan plan, double finest, double coarsest);
 
-  [[nodiscard]] const CodedSum& last() const { return last_; }  ///< of the last try
   [[nodiscard]] double rms_slope() const { return slope_; }
   /// Whether the RMS leapt across the promise with the last trade.
   [[nodiscard]] bool leapt() const { return leapt_; }
