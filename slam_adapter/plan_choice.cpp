@@ -117,7 +117,9 @@ class Chooser {
       if (mixed.search.surfaces_alone()) {
         surface.plan.choice = CodecChoice::surface;
       } else {
-        MAPCODEC_ASSIGN(surface.plan, surface.search.for_rms(plan_with(CodecChoice::surface), rms_m));
+        CodingPlan surface_plan = plan_with(CodecChoice::surface);
+        surface_plan.tiles.trade = mixed.plan.tiles.trade;
+        MAPCODEC_ASSIGN(surface.plan, surface.search.for_rms(surface_plan, rms_m));
       }
       consider(surface);
     }

@@ -9,7 +9,7 @@ namespace {
 constexpr double kPrices[] = {0.18, 0.25, 0.35, 0.5, 0.7, 1, 1.4, 2};
 constexpr double kWeights[] = {0.12, 0.16, 0.22, 0.3, 0.4, 0.5, 0.6};
 constexpr std::ptrdiff_t kUsualPrice = 5, kUsualWeight = 3;
-constexpr double kBalanced = 0.02;       // directions that differ by less are alike
+constexpr double kBalanced = 0.1;        // directions that differ by less weigh as usual
 constexpr double kStepPerPrice = -0.35;  // by how much the logarithm of the step at one error changes
 
 class Climb {
@@ -19,7 +19,8 @@ class Climb {
 
   Result<CodingPlan> run() {
     MAPCODEC_ASSIGN(best_, attempt_(plan_));
-    if (!plan_.has_surfaces() || plan_.tiles.effort == Effort::fast) return std::move(plan_);
+    const bool chosen = plan_.tiles.trade != SurfaceTrade{};
+    if (chosen || !plan_.has_surfaces() || plan_.tiles.effort == Effort::fast) return std::move(plan_);
     MAPCODEC_ASSIGN(const bool lower, climb(kPrices, kUsualPrice, -1, &SurfaceTrade::bit_price));
     if (!lower) MAPCODEC_TRY(climb(kPrices, kUsualPrice, 1, &SurfaceTrade::bit_price));
     const double off = best_.forward_to_backward - 1;

@@ -18,7 +18,8 @@ struct Tried {
 /// Tries a plan, beginning at its step; leaves there the one at which the error is what it should be.
 using TryPlan = std::function<Result<Tried>(CodingPlan&)>;
 
-/// Climbs from `plan` to the bit price and then to the weight that cost least. Errors: those of `attempt`.
+/// Climbs from the usual trade to the bit price and then to the weight that cost least; a plan with another
+/// trade keeps it. Errors: those of `attempt`.
 /// @param patience  values in a row that may cost more before the climb ends.
 [[nodiscard]] Result<CodingPlan> find_trade(CodingPlan plan, int patience, const TryPlan& attempt);
 

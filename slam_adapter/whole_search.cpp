@@ -7,10 +7,11 @@
 namespace mapcodec {
 namespace {
 
-constexpr int kTries = 6, kTriesForNear = 3;
+// The first trade tells the slope; of others it shows soon whether they are better.
+constexpr int kTries = 6, kTriesOfOthers = 2, kTriesForNear = 3;
 constexpr double kAim = 0.992, kNear = 0.98, kLeast = 0.95, kSpent = 0.997;  // of the promise
 // Where the promise is not spent, coarser steps are tried: errors do not grow evenly with them.
-constexpr double kCoarser[] = {1.005, 1.01, 1.015, 1.02, 1.03, 1.05, 1.1};
+constexpr double kCoarser[] = {1.01, 1.02, 1.04, 1.07};
 // Surfaces of few large cells are small, but lose where the points were. Beyond what is hardly seen, a
 // hundredth of density error has to save so many hundredths of a bit per point.
 constexpr double kHardlySeen = 0.1, kDensityWorth = 0.5;
@@ -39,7 +40,9 @@ Result<Tried> WholeSearch::try_steps(CodingPlan& plan, double finest, double coa
   LogSecant secant(kAim * rms_m_, slope_);
   Tried least;
   CodingPlan trial = plan;
-  for (int i = 0; i < kTries; ++i) {
+  const int tries = first_ ? kTries : kTriesOfOthers;
+  first_ = false;
+  for (int i = 0; i < tries; ++i) {
     MAPCODEC_TRY(try_plan(trial));
     const double share = last_.rms_m() / rms_m_;
     if (share <= 1 && score_of(last_) < least.cost) {

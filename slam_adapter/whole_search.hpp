@@ -45,7 +45,7 @@ class WholeSearch {
   const std::atomic<bool>* stop_;
   double rms_m_, slope_;
   CodedSum last_;
-  bool leapt_ = false, surfaces_alone_ = true;
+  bool leapt_ = false, surfaces_alone_ = true, first_ = true;
   std::optional<Kept> best_;
 };
 

@@ -45,7 +45,7 @@ TEST(SurfaceTrades, AsksForFewerBitsWithALargerStep) {
 }
 
 TEST(SurfaceTrades, WeighsTheWorseDirectionMore) {
-  Valley backward{1, 0.16, 0.9}, forward{1, 0.5, 1.1}, alike{1, 0.5, 1.001};
+  Valley backward{1, 0.16, 0.8}, forward{1, 0.5, 1.2}, alike{1, 0.5, 1.05};
   EXPECT_DOUBLE_EQ(find_trade(surfaces(), 1, backward.attempt())->tiles.trade.forward_weight, 0.16);
   EXPECT_DOUBLE_EQ(find_trade(surfaces(), 1, forward.attempt())->tiles.trade.forward_weight, 0.5);
   EXPECT_DOUBLE_EQ(find_trade(surfaces(), 1, alike.attempt())->tiles.trade.forward_weight, 0.3);
@@ -69,6 +69,14 @@ TEST(SurfaceTrades, FastEffortAndPointsTryNothing) {
     EXPECT_EQ(find_trade(plan, 2, valley.attempt())->tiles.trade, SurfaceTrade{});
     EXPECT_EQ(valley.tried.size(), 1u);
   }
+}
+
+TEST(SurfaceTrades, AChosenTradeStays) {
+  CodingPlan plan = surfaces();
+  plan.tiles.trade = {0.7, 0.4};
+  Valley valley{0.25, 0.5, 1.2};
+  EXPECT_EQ(find_trade(plan, 2, valley.attempt())->tiles.trade, (SurfaceTrade{0.7, 0.4}));
+  EXPECT_EQ(valley.tried.size(), 1u);
 }
 
 TEST(SurfaceTrades, AnErrorEndsTheSearch) {

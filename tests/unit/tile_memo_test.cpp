@@ -4,6 +4,8 @@
 
 #include <gtest/gtest.h>
 
+#include <functional>
+
 #include "mapcodec/codec/tile_codec.hpp"
 #include "tests/unit/surface_support.hpp"
 
@@ -52,17 +54,6 @@ TEST(TileMemo, GivesTheSameBytes) {
   }
 }
 
-TEST(TileMemo, IsNotForAnotherTrade) {
-  Colored c = colored_room();
-  TileMemo memo;
-  ASSERT_TRUE(encode_tile(c.cloud, c.schema, c.settings, &memo).ok());
-  c.settings.trade = {0.4, 0.5};
-  const auto anew = encode_tile(c.cloud, c.schema, c.settings);
-  const auto remembered = encode_tile(c.cloud, c.schema, c.settings, &memo);
-  ASSERT_TRUE(anew.ok() && remembered.ok());
-  EXPECT_EQ(anew->bytes, remembered->bytes);
-}
-
 TEST(TileMemo, PositionsFirstAreTheSamePositions) {
   Colored c = colored_room();
   MapSchema positions = c.schema;
@@ -78,16 +69,24 @@ TEST(TileMemo, PositionsFirstAreTheSamePositions) {
   EXPECT_EQ(then->bytes, anew->bytes);
 }
 
-TEST(TileMemo, AnotherStepIsCodedAnew) {
+/// A tile that was remembered with other settings is coded anew.
+void expect_coded_anew(const std::function<void(TileSettings&)>& change) {
   Colored c = colored_room();
   TileMemo memo;
   c.settings.color_slope = 300;
   ASSERT_TRUE(encode_tile(c.cloud, c.schema, c.settings, &memo).ok());
-  c.settings.step_m = 0.03;
+  change(c.settings);
   const auto anew = encode_tile(c.cloud, c.schema, c.settings);
   const auto remembered = encode_tile(c.cloud, c.schema, c.settings, &memo);
   ASSERT_TRUE(anew.ok() && remembered.ok());
   EXPECT_EQ(anew->bytes, remembered->bytes);
+}
+
+TEST(TileMemo, AnotherStepIsCodedAnew) {
+  expect_coded_anew([](TileSettings& s) { s.step_m = 0.03; });
+}
+TEST(TileMemo, AnotherTradeIsCodedAnew) {
+  expect_coded_anew([](TileSettings& s) { s.trade = {0.4, 0.5}; });
 }
 
 TEST(TileMemo, RoughErrorsAreNotRemembered) {
