@@ -33,7 +33,7 @@ Result<EncodedTile> encode_as(CodecId codec, double step_m, const PointCloud& ti
 Result<EncodedTile> encode_cheapest(const PointCloud& tile, const MapSchema& schema, const CodingPlan& plan,
                                     TileMemo* memo) {
   const double price_m2 = plan.tiles.trade.bit_price * plan.step_m * plan.step_m;
-  const double voxel_m = plan.voxel_steps * std::sqrt(price_m2);
+  const double voxel_m = plan.voxels_per_step() * plan.step_m;
   if (plan.fixed) {
     return encode_as(*plan.fixed, plan.fixed == CodecId::surface ? plan.step_m : voxel_m, tile, schema, plan,
                      memo);

@@ -20,6 +20,12 @@ struct CodingPlan {
   std::optional<CodecId> fixed;  ///< the choice is made: surface or points, with the steps of a mixture
   double voxel_steps = 2.7;  ///< voxel side of `points` tiles among surfaces, in surface steps (of price 1)
 
+  /// Side of voxels among surfaces, per surface step.
+  [[nodiscard]] double voxels_per_step() const { return voxel_steps * std::sqrt(tiles.trade.bit_price); }
+  /// The step of the plan at which a tile is coded with these settings, in steps of this plan.
+  [[nodiscard]] double share_of(const TileSettings& s) const {
+    return s.step_m / step_m / (s.codec == CodecId::surface ? 1 : voxels_per_step());
+  }
   [[nodiscard]] bool has_surfaces() const { return choice != CodecChoice::points; }
 };
 

@@ -79,6 +79,8 @@ Result<CompressReport> CompressJob::run() {
   MAPCODEC_ASSIGN(choice_, choose_plan(options_, *tiles_, schema_, arena_, report_.warnings));
   report_.search_seconds = lap(at);
   if (choice_.coded) searched_step_ = choice_.plan.step_m;
+  for (std::size_t i = 0; i < choice_.tiles.size(); ++i)
+    chosen_.emplace(tiles_->tiles()[i].key, choice_.tiles[i]);
   if (const auto color = bounded_color(); color && !has_target() && choice_.plan.has_surfaces())
     color_slope_ = kFirstSlope * schema_.channels[*color].bound;
   MAPCODEC_TRY(encode_until_kept());
@@ -372,9 +374,13 @@ Result<EncodedTile> CompressJob::encode(const PointCloud& tile, const MapSchema&
   const auto key = plan_.tile_of(tile.xyz.front());
   if (!key) return encode_by_plan(tile, target, plan);
   plan.tiles.borders = neighbors_->borders_of(*key);
-  if (plan.choice == CodecChoice::cheapest && report_.codings > 0) {
-    const auto known = codecs_.find(*key);
-    if (known != codecs_.end()) plan.fixed = known->second;
+  const bool chosen = report_.codings > 0 || !choice_.tiles.empty();
+  if (plan.choice == CodecChoice::cheapest && chosen) {
+    const auto own = chosen_.find(*key);
+    if (own != chosen_.end()) {
+      plan.fixed = own->second.codec;
+      plan.step_m *= own->second.step_share;
+    }
   }
   return has_color_slope() ? memory_.encode(*key, tile, target, plan) : encode_by_plan(tile, target, plan);
 }
@@ -382,7 +388,7 @@ Result<EncodedTile> CompressJob::encode(const PointCloud& tile, const MapSchema&
 Status CompressJob::store(const TileKey& key, EncodedTile&& t) {
   coded_.add(t);
   levels_->keep(key, t);
-  codecs_.emplace(key, t.codec);
+  if (choice_.tiles.empty()) chosen_.emplace(key, TileChoice{t.codec});
   bounds_.add(t.bounds);
   report_.geometry_bytes += t.geometry_bytes;
   return writer_->add(key, static_cast<std::uint8_t>(t.codec), t.points, t.bounds, t.errors, t.bytes);

@@ -72,7 +72,7 @@ class CompressJob {
   std::unique_ptr<MapWriter> writer_;
   PlanChoice choice_;
   CodedSum coded_;
-  std::map<TileKey, CodecId, MortonLess> codecs_;  // of the tiles, as the first coding chose them
+  std::map<TileKey, TileChoice, MortonLess> chosen_;  // for the tiles, by the search or their first coding
   Box bounds_;
   double position_step_ = 0;                     // what the positions' promise alone would allow
   double searched_step_ = 0;                     // where the search ended on the whole map; 0: it did not

@@ -79,11 +79,32 @@ class Chooser {
     const bool forced = allowed == CodecChoice::surface;
     const double rms_m = options_.promise_m;
     if (!forced && rms_m < kHopelessForSurfaces * sample_.spacing_m) return say_if_dear();
-    MAPCODEC_ASSIGN(const std::optional<Found> best, best_for_rms(allowed, rms_m));
-    if (!best) return say_if_dear();
-    take(best->plan, best->search);
+    if (sample_.whole && sample_.pieces.size() > 1) {
+      MAPCODEC_ASSIGN(const bool found, found_for_each_tile(allowed, rms_m));
+      if (!found) return say_if_dear();
+    } else {
+      MAPCODEC_ASSIGN(const std::optional<Found> best, best_for_rms(allowed, rms_m));
+      if (!best) return say_if_dear();
+      take(best->plan, best->search);
+    }
     schema_.channels = resampled_channels(schema_, sample_, warnings_);
     return {};
+  }
+
+  /// A small map of several tiles was coded as a whole while it was searched.
+  Result<bool> found_for_each_tile(CodecChoice allowed, double rms_m) {
+    RateSearch s = search(schema_);
+    CodingPlan plan = plan_with(allowed);
+    MAPCODEC_ASSIGN(auto tiles, s.for_each_tile(plan, rms_m, allowed == CodecChoice::cheapest));
+    if (!tiles) return false;
+    choice_.plan = plan;
+    choice_.coded.emplace();
+    for (TileTry& t : *tiles) {
+      choice_.tiles.push_back({t.settings.codec, plan.share_of(t.settings)});
+      choice_.coded->tiles.push_back(std::move(t.coded));
+      choice_.coded->seconds.push_back(t.seconds);
+    }
+    return true;
   }
 
   struct Found {
@@ -95,7 +116,7 @@ class Chooser {
   /// tile that changes over takes much of the map with it. Nothing if that is `points`.
   Result<std::optional<Found>> best_for_rms(CodecChoice allowed, double rms_m) {
     // One tile has no mixture: what it loses would leap from one codec to the other.
-    const bool alone = sample_.whole && sample_.pieces.size() == 1;
+    const bool alone = sample_.whole;
     Found mixed{{}, search(schema_)};
     MAPCODEC_ASSIGN(mixed.plan,
                     mixed.search.for_rms(plan_with(alone ? CodecChoice::surface : allowed), rms_m));

@@ -10,6 +10,12 @@
 
 namespace mapcodec {
 
+/// How one tile departs from the plan.
+struct TileChoice {
+  CodecId codec = CodecId::points;
+  double step_share = 1;  ///< of the plan's step
+};
+
 struct PlanChoice {
   CodingPlan plan;
   double rms_slope = 1;   ///< d log RMS / d log step near the plan's step
@@ -18,6 +24,8 @@ struct PlanChoice {
   double side_m = 0;      ///< longest side of a piece of the sample
   /// The whole map's positions, coded by this plan, where the search came across them.
   std::optional<CodedTiles> coded;
+  /// Where each tile has a codec and a step of its own: these, in the order of the tiles; else empty.
+  std::vector<TileChoice> tiles;
 };
 
 /// What the options ask of codecs: surfaces are for an RMS promise, and always keep counts.

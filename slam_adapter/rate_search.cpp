@@ -16,7 +16,8 @@ namespace mapcodec {
 namespace {
 
 constexpr int kMostTries = 12;
-constexpr std::size_t kFewPoints = 60000;                         // for the first tries
+constexpr std::size_t kFewPoints = 60000;  // for the first tries
+constexpr std::size_t kTradePoints = 60000;
 constexpr double kRmsAim = 0.992;                                 // of the promise
 constexpr double kCloseEnough = 0.06, kCloseEnoughOnAll = 0.015;  // of the target; the rest is extrapolated
 constexpr double kFinest = 1.0 / (1 << 20);                       // of the longest side of a piece
@@ -124,19 +125,50 @@ Status RateSearch::seek_rms(CodingPlan& plan, const MapSchema& schema, double rm
 Status RateSearch::choose_trade(CodingPlan& plan, const MapSchema& schema, double rms_m,
                                 const Range& steps) const {
   if (!plan.has_surfaces() || plan.tiles.effort == Effort::fast) return {};
-  MAPCODEC_ASSIGN(plan, TradeSearch(large_, schema, arena_, stop_, rms_m).run(plan));
+  const TileSample some = sample_.whole ? sample_.some(kTradePoints) : TileSample{};
+  const MeasurePlan measure = [&](const CodingPlan& trial) {
+    MapSchema with_step = schema;
+    with_step.step_m = trial.step_m;
+    return encode_sample(sample_.whole ? some : large_, with_step, trial, arena_, stop_);
+  };
+  MAPCODEC_ASSIGN(plan, TradeSearch(rms_m, measure).run(plan));
   plan.step_m = std::clamp(plan.step_m, steps.finest, steps.coarsest);
   return {};
 }
 
-Result<CodingPlan> RateSearch::for_rms(CodingPlan plan, double rms_m) {
-  // Half a voxel is what its centre loses. What surfaces lose depends on how far the points lie apart.
+/// Half a voxel is what its centre loses. What surfaces lose depends on how far the points lie apart.
+double RateSearch::first_step(const CodingPlan& plan, double rms_m) const {
   const double spacings = sample_.spacing_m > 0 ? rms_m / sample_.spacing_m : 1;
-  plan.step_m = rms_m * (plan.has_surfaces() ? std::clamp(1.1 * spacings, 0.5, 3.0) : 2.0);
-  // Beyond the size of the whole nothing is lost by coarser steps any more, and nothing gained.
-  const Range steps{rms_m / 16, 8 * std::max(sample_.side_m, rms_m)};
-  MAPCODEC_TRY(seek_rms(plan, positions_alone(schema_), rms_m, steps));
+  return rms_m * (plan.has_surfaces() ? std::clamp(1.1 * spacings, 0.5, 3.0) : 2.0);
+}
+
+/// Beyond the size of the whole nothing is lost by coarser steps any more, and nothing gained.
+RateSearch::Range RateSearch::steps_for(double rms_m) const {
+  return {rms_m / 16, 8 * std::max(sample_.side_m, rms_m)};
+}
+
+Result<CodingPlan> RateSearch::for_rms(CodingPlan plan, double rms_m) {
+  plan.step_m = first_step(plan, rms_m);
+  MAPCODEC_TRY(seek_rms(plan, positions_alone(schema_), rms_m, steps_for(rms_m)));
   return plan;
+}
+
+Result<std::optional<std::vector<TileTry>>> RateSearch::for_each_tile(CodingPlan& plan, double rms_m,
+                                                                      bool with_points) {
+  const MapSchema schema = positions_alone(schema_);
+  plan.choice = CodecChoice::surface;
+  plan.step_m = first_step(plan, rms_m);
+  MAPCODEC_TRY(choose_trade(plan, schema, kRmsAim * rms_m, steps_for(rms_m)));
+  const CodeTiles code = [&](std::span<const std::size_t> pieces, const TileSettings& settings) {
+    return encode_pieces(sample_, pieces, schema, settings, arena_, stop_);
+  };
+  TileSettings surfaces = plan.tiles;
+  surfaces.step_m = plan.step_m;
+  MAPCODEC_ASSIGN(auto settled, MixtureSearch(sample_.pieces.size(), rms_m, code).run(surfaces, with_points));
+  plan.choice = CodecChoice::cheapest;
+  const auto is_surface = [](const TileTry& t) { return t.settings.codec == CodecId::surface; };
+  if (settled && std::none_of(settled->begin(), settled->end(), is_surface)) settled.reset();
+  return settled;
 }
 
 Result<CodingPlan> RateSearch::for_bits(CodingPlan plan, double bits_per_point) {

@@ -4,6 +4,7 @@
 
 #include <optional>
 
+#include "slam_adapter/mixture_search.hpp"
 #include "slam_adapter/tile_sample.hpp"
 
 namespace mapcodec {
@@ -21,6 +22,11 @@ class RateSearch {
   /// steps lose less (all points equal, say), a coarse one. Where the sample is the whole map, mostly one
   /// that was tried and keeps the promise closely (see coded()). Errors: those of encoding; Cancelled.
   [[nodiscard]] Result<CodingPlan> for_rms(CodingPlan plan, double rms_m);
+  /// Where the sample is the whole map: a coding for each piece, by surfaces or, if `with_points`, as points.
+  /// Nothing if none of those tried keep the RMS together, or all are points. Errors: as for_rms.
+  /// @param plan  out: its trade and step.
+  [[nodiscard]] Result<std::optional<std::vector<TileTry>>> for_each_tile(CodingPlan& plan, double rms_m,
+                                                                          bool with_points);
   /// The step with which the sample takes about `bits_per_point`, channels included. Errors: InvalidArgument
   /// where no step does, because channels alone take more; those of encoding; Cancelled.
   [[nodiscard]] Result<CodingPlan> for_bits(CodingPlan plan, double bits_per_point);
@@ -51,6 +57,8 @@ class RateSearch {
   struct Range {
     double finest, coarsest;
   };
+  [[nodiscard]] double first_step(const CodingPlan& plan, double rms_m) const;
+  [[nodiscard]] Range steps_for(double rms_m) const;
   [[nodiscard]] Status seek_rms(CodingPlan& plan, const MapSchema& schema, double rms_m, const Range& steps);
   [[nodiscard]] Status seek_whole(CodingPlan& plan, const MapSchema& schema, double rms_m, const Range& steps,
                                   double& slope);

@@ -120,6 +120,21 @@ TileSample TileSample::part(std::size_t most) const {
   return r;
 }
 
+TileSample TileSample::some(std::size_t most) const {
+  const std::size_t all = points();
+  if (all <= most) return *this;
+  TileSample r{{}, {}, false, side_m, spacing_m};
+  for (std::size_t i = 0, before = 0; i < pieces.size(); ++i) {
+    // Each piece in whose middle the next of evenly spread points lies.
+    const std::size_t middle = before + pieces[i].size() / 2;
+    before += pieces[i].size();
+    if (r.points() >= middle * most / all) continue;
+    r.pieces.push_back(pieces[i]);
+    if (i < borders.size()) r.borders.push_back(borders[i]);
+  }
+  return r;
+}
+
 double mean_spacing(std::vector<Vec3> points) {
   std::sort(points.begin(), points.end());
   points.erase(std::unique(points.begin(), points.end()), points.end());
@@ -169,6 +184,25 @@ Result<CodedSum> encode_sample(const TileSample& sample, const MapSchema& schema
     tiles->seconds = std::move(seconds);
   }
   return sum;
+}
+
+Result<std::vector<std::optional<TileTry>>> encode_pieces(const TileSample& sample,
+                                                          std::span<const std::size_t> pieces,
+                                                          const MapSchema& schema,
+                                                          const TileSettings& settings, Arena& arena,
+                                                          const std::atomic<bool>* stop) {
+  if (stop != nullptr && stop->load()) return make_error(ErrorCode::kCancelled, "interrupted");
+  std::vector<std::optional<TileTry>> tries(pieces.size());
+  TbbRunner(arena).run(pieces.size(), [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const double since = thread_seconds();
+      TileSettings own = settings;
+      if (pieces[i] < sample.borders.size()) own.borders = sample.borders[pieces[i]];
+      auto coded = encode_tile(sample.pieces[pieces[i]], schema, own);
+      if (coded.ok()) tries[i] = TileTry{own, std::move(coded).value(), thread_seconds() - since};
+    }
+  });
+  return tries;
 }
 
 }  // namespace mapcodec

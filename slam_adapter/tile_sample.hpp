@@ -7,6 +7,7 @@
 
 #include "parallel/tile_set.hpp"
 #include "slam_adapter/coding_plan.hpp"
+#include "slam_adapter/mixture_search.hpp"
 
 namespace mapcodec {
 
@@ -20,6 +21,8 @@ struct TileSample {
   [[nodiscard]] std::size_t points() const;
   /// Compact parts of the pieces, `points` together or a little more.
   [[nodiscard]] TileSample part(std::size_t points) const;
+  /// Some of the pieces, uncut and evenly spread: `points` together, about, but one piece at least.
+  [[nodiscard]] TileSample some(std::size_t points) const;
 };
 
 /// The whole map if it is small; else sixteen tiles at most, evenly spread, and of large ones a compact part,
@@ -41,6 +44,12 @@ struct CodedTiles {
 [[nodiscard]] Result<CodedSum> encode_sample(const TileSample& sample, const MapSchema& schema,
                                              const CodingPlan& plan, Arena& arena,
                                              const std::atomic<bool>* stop, CodedTiles* tiles = nullptr);
+
+/// Encodes these pieces by one codec, in parallel; nothing where a piece cannot be coded so. Errors:
+/// Cancelled.
+[[nodiscard]] Result<std::vector<std::optional<TileTry>>> encode_pieces(
+    const TileSample& sample, std::span<const std::size_t> pieces, const MapSchema& schema,
+    const TileSettings& settings, Arena& arena, const std::atomic<bool>* stop);
 
 /// Mean distance [m] of some thousand finite points, evenly spread, to the nearest other position.
 [[nodiscard]] double mean_spacing(std::vector<Vec3> points);

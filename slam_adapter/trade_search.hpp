@@ -3,30 +3,28 @@
 #pragma once
 
 #include "slam_adapter/surface_trades.hpp"
-#include "slam_adapter/tile_sample.hpp"
 
 namespace mapcodec {
 
+/// What a sample's positions cost and lose by a plan. Errors: those of encoding; Cancelled.
+using MeasurePlan = std::function<Result<CodedSum>(const CodingPlan&)>;
+
 class TradeSearch {
  public:
-  /// All must outlive the search. @param schema  positions alone. @param rms_m  that all prices are compared
-  /// at.
-  TradeSearch(const TileSample& sample, const MapSchema& schema, Arena& arena, const std::atomic<bool>* stop,
-              double rms_m)
-      : sample_(sample), schema_(schema), arena_(arena), stop_(stop), rms_m_(rms_m) {}
+  /// @param rms_m  that all trades are compared at. @param measure  must outlive the search.
+  TradeSearch(double rms_m, const MeasurePlan& measure) : rms_m_(rms_m), measure_(measure) {}
 
   /// `plan` with the trade that takes the fewest bits at the RMS, and about the step that belongs to it.
-  /// @param plan  has surfaces; its step should give about the RMS. Errors: those of encoding; Cancelled.
+  /// Where surfaces cost far more than points do, no other trade is tried. Errors: those of `measure`.
+  /// @param plan  has surfaces; its step should give about the RMS.
   [[nodiscard]] Result<CodingPlan> run(CodingPlan plan) const;
 
  private:
-  [[nodiscard]] Result<Tried> bits_of(CodingPlan& plan) const;
+  [[nodiscard]] Result<Tried> bits_of(CodingPlan& plan, int tries) const;
+  [[nodiscard]] Result<double> bits_of_points() const;
 
-  const TileSample& sample_;
-  const MapSchema& schema_;
-  Arena& arena_;
-  const std::atomic<bool>* stop_;
   double rms_m_;
+  const MeasurePlan& measure_;
 };
 
 }  // namespace mapcodec
