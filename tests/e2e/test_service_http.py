@@ -197,7 +197,8 @@ class Figures(HttpTest):
         for name in ("mapcodec_request_seconds", "mapcodec_commit_seconds", "mapcodec_commit_scans"):
             self.assertEqual(f[name].type, "histogram")
         for name in ("mapcodec_cache_hits", "mapcodec_cache_bytes", "mapcodec_compactions", "mapcodec_compacting",
-                     "mapcodec_watchers", "mapcodec_busy", "process_resident_memory_bytes", "mapcodec_http_connections"):
+                     "mapcodec_watchers", "mapcodec_busy", "mapcodec_allocated_bytes",
+                     "process_resident_memory_bytes", "mapcodec_http_connections"):
             self.assertIn(name, f)
 
     def test_hostile_paths_make_no_series(self):

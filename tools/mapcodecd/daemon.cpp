@@ -25,7 +25,7 @@ namespace {
 /// the resident memory of a service at an even load would creep up for hours.
 void wait_for_stop(const std::atomic<bool>& stop) {
   constexpr auto kLook = std::chrono::milliseconds(50);
-  constexpr int kLooksToTrim = 200;
+  constexpr int kLooksToTrim = 40;
   for (int looks = 1; !stop; looks = looks % kLooksToTrim + 1) {
     std::this_thread::sleep_for(kLook);
     if (looks == kLooksToTrim) ::malloc_trim(0);

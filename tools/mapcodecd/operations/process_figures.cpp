@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "tools/mapcodecd/operations/process_figures.hpp"
 
+#include <malloc.h>
 #include <sys/resource.h>
 #include <unistd.h>
 
@@ -16,6 +17,12 @@ double resident_bytes() {
   double size = 0, resident = 0;
   file >> size >> resident;
   return resident * static_cast<double>(sysconf(_SC_PAGESIZE));
+}
+
+/// What the program holds; the rest of the resident heap was freed and is kept for the next who asks.
+double allocated_bytes() {
+  const struct mallinfo2 heap = ::mallinfo2();
+  return static_cast<double>(heap.uordblks) + static_cast<double>(heap.hblkhd);
 }
 
 double processor_seconds() {
@@ -46,11 +53,13 @@ double most_files() {
 
 std::vector<GaugeSample> process_figures() {
   static const auto start = static_cast<double>(std::time(nullptr));  // of the first scrape or of main
-  return {{"process_resident_memory_bytes", "Resident memory.", resident_bytes()},
-          {"process_cpu_seconds_total", "Processor time.", processor_seconds(), true},
-          {"process_open_fds", "Open files.", open_files()},
-          {"process_max_fds", "Files that may be open.", most_files()},
-          {"process_start_time_seconds", "Start of the process, since 1970.", start}};
+  return {
+      {"process_resident_memory_bytes", "Resident memory.", resident_bytes()},
+      {"mapcodec_allocated_bytes", "Memory in use, without what is free within the heap.", allocated_bytes()},
+      {"process_cpu_seconds_total", "Processor time.", processor_seconds(), true},
+      {"process_open_fds", "Open files.", open_files()},
+      {"process_max_fds", "Files that may be open.", most_files()},
+      {"process_start_time_seconds", "Start of the process, since 1970.", start}};
 }
 
 }  // namespace mapcodec::daemon
