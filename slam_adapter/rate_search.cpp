@@ -91,7 +91,7 @@ Status RateSearch::seek_on(const TileSample& sample, CodingPlan& plan, const Map
 Status RateSearch::seek_whole(CodingPlan& plan, const MapSchema& schema, double rms_m, const Range& steps,
                               double& slope) {
   WholeSearch search(sample_, schema, arena_, stop_, rms_m, slope);
-  MAPCODEC_ASSIGN(auto best, search.run(plan, steps.finest, steps.coarsest));
+  MAPCODEC_ASSIGN(auto best, search.run(plan, {steps.finest, steps.coarsest}));
   slope = search.rms_slope();
   leapt_ = search.leapt();
   surfaces_alone_ = surfaces_alone_ && search.surfaces_alone();

@@ -40,7 +40,7 @@ class Climb {
       CodingPlan trial = last;
       const double value = values[static_cast<std::size_t>(i)];
       if (field == &SurfaceTrade::bit_price)
-        trial.step_m *= std::pow(value / trial.tiles.trade.bit_price, kStepPerPrice);
+        trial.step_m *= step_for_price(value / trial.tiles.trade.bit_price);
       trial.tiles.trade.*field = value;
       MAPCODEC_ASSIGN(const Tried tried, attempt_(trial));
       last = trial;
@@ -63,6 +63,10 @@ class Climb {
 };
 
 }  // namespace
+
+double step_for_price(double times) {
+  return std::pow(times, kStepPerPrice);
+}
 
 Result<CodingPlan> find_trade(CodingPlan plan, int patience, const TryPlan& attempt) {
   return Climb(std::move(plan), patience, attempt).run();

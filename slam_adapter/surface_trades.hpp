@@ -18,6 +18,9 @@ struct Tried {
 /// Tries a plan, beginning at its step; leaves there the one at which the error is what it should be.
 using TryPlan = std::function<Result<Tried>(CodingPlan&)>;
 
+/// By how much the step changes at one error where a bit has to save `times` as much.
+[[nodiscard]] double step_for_price(double times);
+
 /// Climbs from the usual trade to the bit price and then to the weight that cost least; a plan with another
 /// trade keeps it. Errors: those of `attempt`.
 /// @param patience  values in a row that may cost more before the climb ends.

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The search on a map so small that it is its own sample: every try is a coding of the map, and the best that
-// keeps the promise is the map's.
+// The search on a map so small that it is one tile and its own sample: every try is a coding of the map, and
+// the best that keeps the promise is the map's.
 #pragma once
 
 #include <optional>
+#include <random>
 
 #include "slam_adapter/surface_trades.hpp"
 #include "slam_adapter/tile_sample.hpp"
@@ -24,9 +25,11 @@ class WholeSearch {
     CodedTiles coded;
     double score = INFINITY;  ///< of size and density; the least is the best
   };
-  /// The best of all tries; none if no step keeps the promise. @param finest, coarsest  steps [m].
-  /// Errors: those of encoding; Cancelled.
-  [[nodiscard]] Result<std::optional<Kept>> run(CodingPlan plan, double finest, double coarsest);
+  struct Range {
+    double finest_m, coarsest_m;  ///< steps
+  };
+  /// The best of all tries; none if no step keeps the promise. Errors: those of encoding; Cancelled.
+  [[nodiscard]] Result<std::optional<Kept>> run(CodingPlan plan, const Range& steps);
 
   [[nodiscard]] double rms_slope() const { return slope_; }
   /// Whether the RMS leapt across the promise with the last trade.
@@ -35,9 +38,13 @@ class WholeSearch {
   [[nodiscard]] bool surfaces_alone() const { return surfaces_alone_; }
 
  private:
+  [[nodiscard]] Result<Kept> code(const CodingPlan& plan) const;
+  void look_at(Kept&& tried);
   [[nodiscard]] Status try_plan(const CodingPlan& plan);
-  [[nodiscard]] Result<Tried> try_steps(CodingPlan& plan, double finest, double coarsest);
-  [[nodiscard]] Status try_coarser(double coarsest);
+  [[nodiscard]] Result<Tried> try_steps(CodingPlan& plan, const Range& steps);
+  [[nodiscard]] Status try_coarser(double coarsest_m);
+  [[nodiscard]] CodingPlan near_best(std::mt19937_64& random, const Range& steps) const;
+  [[nodiscard]] Status try_near(const Range& steps);
 
   const TileSample& sample_;
   const MapSchema& schema_;

@@ -54,6 +54,13 @@ class Promises(ProgramTest):
         self.assertEqual(archive.read_bytes(), again.read_bytes())
         self.succeeds("verify", archive, "--against", source)
 
+    def test_high_effort_tries_side_by_side_and_gives_the_same_bytes(self):
+        source = write(self.path("in.pcd"), pcd_bytes(room(8000, XYZ, noise=0.002)))
+        one, two = (self.compress(source, "--rms", 0.05, "--effort", "high", "--threads", n, name=f"{n}.mapc")
+                    for n in (1, 2))
+        self.assertEqual(one.read_bytes(), two.read_bytes())
+        self.succeeds("verify", one, "--against", source)
+
     def test_codecs_of_one_map_may_differ(self):
         """A wall beside dust: surfaces for the one, points for the other."""
         r = random.Random(3)
