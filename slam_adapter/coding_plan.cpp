@@ -81,6 +81,12 @@ TileErrors CodedSum::errors() const {
   return {rms_m(), max_axis_, color_ / points_, density_ / points_};
 }
 
+double worth_of_density(double density_error) {
+  // Beyond what is hardly seen, a hundredth has to save so many hundredths of a bit.
+  constexpr double kHardlySeen = 0.1, kWorth = 0.5;
+  return kWorth * std::max(0.0, density_error - kHardlySeen);
+}
+
 MapSchema positions_alone(MapSchema schema) {
   for (ChannelSchema& c : schema.channels) c.kept = ChannelKept::dropped;
   return schema;

@@ -61,6 +61,10 @@ class CodedSum {
   double geometry_bytes_ = 0, surface_points_ = 0;
 };
 
+/// What a density error counts when codings are compared [bits per point]. Surfaces of few large cells are
+/// small, but lose where the points were.
+[[nodiscard]] double worth_of_density(double density_error);
+
 /// `schema` with all channels dropped: for positions alone.
 [[nodiscard]] MapSchema positions_alone(MapSchema schema);
 

@@ -30,29 +30,31 @@ Prices prices_of(std::span<const Codings> tiles) {
   return {least_error / most_bits / 16, std::max(16 * most_error, 1.0)};
 }
 
-/// Takes the change that saves most while there is one that fits.
+/// Another coding for a tile, and the bits that it saves.
+struct Change {
+  std::size_t tile, coding;
+  double saved;
+};
+
+/// Takes what still fits, what saves most first.
 void fill_up(std::span<const Codings> tiles, const MixtureLimit& limit, Choice& choice) {
-  MixtureLimit lost = lost_by(tiles, choice);
-  for (;;) {
-    std::size_t tile = 0, coding = 0;
-    double most_saved = 0;
-    MixtureLimit then;
-    for (std::size_t i = 0; i < tiles.size(); ++i) {
-      const CodingFigures& now = tiles[i][choice[i]];
-      for (std::size_t k = 0; k < tiles[i].size(); ++k) {
-        const CodingFigures& other = tiles[i][k];
-        const MixtureLimit after{lost.forward - now.forward + other.forward,
-                                 lost.backward - now.backward + other.backward};
-        if (now.bits - other.bits <= most_saved || !fits(after, limit)) continue;
-        most_saved = now.bits - other.bits;
-        tile = i;
-        coding = k;
-        then = after;
-      }
+  std::vector<Change> changes;
+  for (std::size_t i = 0; i < tiles.size(); ++i) {
+    for (std::size_t k = 0; k < tiles[i].size(); ++k) {
+      const double saved = tiles[i][choice[i]].bits - tiles[i][k].bits;
+      if (saved > 0) changes.push_back({i, k, saved});
     }
-    if (!(most_saved > 0)) return;
-    choice[tile] = coding;
-    lost = then;
+  }
+  std::stable_sort(changes.begin(), changes.end(),
+                   [](const Change& a, const Change& b) { return a.saved > b.saved; });
+  MixtureLimit lost = lost_by(tiles, choice);
+  for (const Change& c : changes) {
+    const CodingFigures &now = tiles[c.tile][choice[c.tile]], &other = tiles[c.tile][c.coding];
+    const MixtureLimit after{lost.forward - now.forward + other.forward,
+                             lost.backward - now.backward + other.backward};
+    if (other.bits >= now.bits || !fits(after, limit)) continue;
+    choice[c.tile] = c.coding;
+    lost = after;
   }
 }
 

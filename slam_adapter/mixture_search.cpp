@@ -23,8 +23,6 @@ constexpr double kNearlyFree = 0.5;  // bits per point
 // A uniform cell's root mean square distance from its centre, in sides.
 constexpr double kRmsOfCell = 0.5;
 constexpr double kVoxelRms = 0.995;  // of the rms: what a voxel is made for
-// Beyond what is hardly seen, a hundredth of density error has to save so many hundredths of a bit per point.
-constexpr double kHardlySeen = 0.1, kDensityWorth = 0.5;
 
 CodingFigures figures_of(const EncodedTile& t) {
   const auto in = double(t.input_points), out = double(t.points);
@@ -47,8 +45,7 @@ Status MixtureSearch::try_all(std::span<const std::size_t> tiles, const TileSett
     const EncodedTile& t = tries[i]->coded;
     CodingFigures figures = figures_of(t);
     sizes_[tiles[i]].push_back(figures);
-    figures.bits +=
-        double(t.input_points) * kDensityWorth * std::max(0.0, t.errors.density_error - kHardlySeen);
+    figures.bits += double(t.input_points) * worth_of_density(t.errors.density_error);
     figures_[tiles[i]].push_back(figures);
     tried_[tiles[i]].push_back(std::move(*tries[i]));
   }

@@ -79,14 +79,18 @@ class Chooser {
     const bool forced = allowed == CodecChoice::surface;
     const double rms_m = options_.promise_m;
     if (!forced && rms_m < kHopelessForSurfaces * sample_.spacing_m) return say_if_dear();
-    if (sample_.whole && sample_.pieces.size() > 1) {
-      MAPCODEC_ASSIGN(const bool found, found_for_each_tile(allowed, rms_m));
-      if (!found) return say_if_dear();
-    } else {
-      MAPCODEC_ASSIGN(const std::optional<Found> best, best_for_rms(allowed, rms_m));
-      if (!best) return say_if_dear();
-      take(best->plan, best->search);
+    const bool several = sample_.whole && sample_.pieces.size() > 1;
+    bool found = false;
+    if (several) {
+      MAPCODEC_ASSIGN(found, found_for_each_tile(allowed, rms_m));
     }
+    // What was asked for is found at one step for all tiles, or why not is said.
+    if (!found && (forced || !several)) {
+      MAPCODEC_ASSIGN(const std::optional<Found> best, best_for_rms(allowed, rms_m));
+      if (best) take(best->plan, best->search);
+      found = best.has_value();
+    }
+    if (!found) return say_if_dear();
     schema_.channels = resampled_channels(schema_, sample_, warnings_);
     return {};
   }
@@ -115,7 +119,8 @@ class Chooser {
   /// The fewest bits of the mixture and either codec alone: a mixture cannot come between the two where a
   /// tile that changes over takes much of the map with it. Nothing if that is `points`.
   Result<std::optional<Found>> best_for_rms(CodecChoice allowed, double rms_m) {
-    // One tile has no mixture: what it loses would leap from one codec to the other.
+    // A map that is its own sample has one tile here, whose loss would leap from one codec to the other, or
+    // is to have surfaces only.
     const bool alone = sample_.whole;
     Found mixed{{}, search(schema_)};
     MAPCODEC_ASSIGN(mixed.plan,
@@ -144,7 +149,7 @@ class Chooser {
       }
       consider(surface);
     }
-    if (share > 0 && !(mixed.search.leapt() && sample_.pieces.size() == 1 && !alone)) consider(mixed);
+    if (share > 0 && (alone || !mixed.search.leapt() || sample_.pieces.size() > 1)) consider(mixed);
     return best;
   }
 

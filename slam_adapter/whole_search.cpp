@@ -23,13 +23,9 @@ constexpr int kBroods = 10, kPatience = 3;
 // How far they lie, as logarithms. A tile of few cells leaps by several hundredths in size and error where a
 // setting moves by one.
 constexpr double kPriceSpread = 0.15, kWeightSpread = 0.15, kStepSpread = 0.02;
-// Surfaces of few large cells are small, but lose where the points were. Beyond what is hardly seen, a
-// hundredth of density error has to save so many hundredths of a bit per point.
-constexpr double kHardlySeen = 0.1, kDensityWorth = 0.5;
 
 double score_of(const CodedSum& sum) {
-  return sum.geometry_bits_per_point() +
-         kDensityWorth * std::max(0.0, sum.errors().density_error - kHardlySeen);
+  return sum.geometry_bits_per_point() + worth_of_density(sum.errors().density_error);
 }
 
 }  // namespace
