@@ -78,6 +78,23 @@ Result<MapStats> MapClient::stats() const {
                   m.queued_scans(), m.queued_points(), m.editing(), m.compacting()};
 }
 
+Result<ServiceStats> MapClient::service_stats() const {
+  v1::StatsReply reply;
+  MAPCODEC_TRY(call(*connection_, connection_->settings.timeout_s, &Stub::Stats, v1::StatsRequest(), reply));
+  ServiceStats s;
+  s.maps = reply.maps();
+  s.editors = reply.editors();
+  s.queued_scans = reply.queued_scans();
+  s.queued_points = reply.queued_points();
+  s.queue_limit_points = reply.queue_limit_points();
+  s.cache_bytes = reply.cache_bytes();
+  s.cache_limit_bytes = reply.cache_limit_bytes();
+  s.cache_hits = reply.cache_hits();
+  s.cache_misses = reply.cache_misses();
+  s.watchers = reply.watchers();
+  return s;
+}
+
 Result<std::uint64_t> MapClient::set_poses(const std::vector<MapService::NamedPose>& poses) const {
   v1::SetPosesRequest r;
   for (const auto& p : poses) {

@@ -85,6 +85,8 @@ class MapClient {
   [[nodiscard]] Result<std::vector<MapEntry>> list() const;
   [[nodiscard]] Status remove() const;
   [[nodiscard]] Result<MapStats> stats() const;
+  /// Of the whole service; what is not in StatsReply stays 0.
+  [[nodiscard]] Result<ServiceStats> service_stats() const;
 
   /// @param facts  may be nullptr. @param sink  is given each tile; an error of it ends the call.
   [[nodiscard]] Status tiles(const TileRequest& request, RemoteFacts* facts,

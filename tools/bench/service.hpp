@@ -13,8 +13,9 @@ namespace mapcodec::bench {
 /// A mapcodecd of its own, on a free port of loopback, over an empty folder.
 class ChildDaemon {
  public:
-  /// @param folder  is emptied. Errors: NotFound (no mapcodecd beside this program), Unreachable.
-  [[nodiscard]] static Result<ChildDaemon> start(const std::string& folder);
+  /// @param folder  is emptied. @param config  what is to be as not usual, in TOML. Errors: NotFound (no
+  /// mapcodecd beside this program), Unreachable.
+  [[nodiscard]] static Result<ChildDaemon> start(const std::string& folder, const std::string& config = "");
   ChildDaemon(ChildDaemon&& other) noexcept;
   ChildDaemon& operator=(ChildDaemon&&) = delete;
   ~ChildDaemon();
@@ -44,6 +45,7 @@ struct LoadResult {
   std::vector<double> waits_s;                    ///< from a scan's sending until it is durable
   std::vector<double> resident_mb;                ///< each second
   std::vector<double> stored_points, archive_mb;  ///< of the map, each second
+  std::vector<double> cache_mb;                   ///< segments that the daemon holds, each second
   std::vector<std::string> faults;
 };
 /// Writers put scans of a spinning lidar in while readers pull tiles.

@@ -16,7 +16,7 @@ extern char** environ;
 namespace mapcodec::bench {
 namespace fs = std::filesystem;
 
-Result<ChildDaemon> ChildDaemon::start(const std::string& folder) {
+Result<ChildDaemon> ChildDaemon::start(const std::string& folder, const std::string& config) {
   std::error_code error;
   const fs::path program = fs::read_symlink("/proc/self/exe", error).parent_path() / "mapcodecd";
   if (!fs::exists(program, error))
@@ -25,10 +25,12 @@ Result<ChildDaemon> ChildDaemon::start(const std::string& folder) {
   d.folder_ = folder;
   fs::remove_all(folder, error);
   fs::create_directories(folder + "/maps", error);
-  const std::string data = folder + "/maps", ports = folder + "/ports", log = folder + "/log";
-  std::vector<std::string> words{
-      program.string(), "--data",      data,  "--listen",    "127.0.0.1:0", "--http",
-      "127.0.0.1:0",    "--port-file", ports, "--log-level", "warn"};
+  const std::string data = folder + "/maps", ports = folder + "/ports", log = folder + "/log",
+                    settings = folder + "/mapcodecd.toml";
+  std::ofstream(settings) << config;
+  std::vector<std::string> words{program.string(), "--data",      data,          "--listen", "127.0.0.1:0",
+                                 "--http",         "127.0.0.1:0", "--port-file", ports,      "--log-level",
+                                 "warn",           "--config",    settings};
   std::vector<char*> argv;
   for (std::string& w : words) argv.push_back(w.data());
   argv.push_back(nullptr);

@@ -127,9 +127,11 @@ Result<LoadResult> run_load(ChildDaemon& daemon, const std::string& map, const P
     std::this_thread::sleep_for(std::chrono::seconds(1));
     shared.result.resident_mb.push_back(daemon.resident_mb());
     const auto stats = client.stats();
-    if (!stats.ok()) continue;
+    const auto service = client.service_stats();
+    if (!stats.ok() || !service.ok()) continue;
     shared.result.stored_points.push_back(double(stats->points));
     shared.result.archive_mb.push_back(double(stats->file_bytes) / 1e6);
+    shared.result.cache_mb.push_back(double(service->cache_bytes) / 1e6);
   }
   shared.stop = true;
   for (std::thread& t : threads) t.join();
