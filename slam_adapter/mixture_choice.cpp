@@ -21,6 +21,7 @@ Prices prices_of(std::span<const Codings> tiles) {
   double least_error = INFINITY, most_error = 0, most_bits = 1;
   for (const Codings& codings : tiles) {
     for (const CodingFigures& c : codings) {
+      if (!std::isfinite(c.bits)) continue;
       const double error = c.forward + c.backward;
       if (error > 0) least_error = std::min(least_error, error);
       most_error = std::max(most_error, error);

@@ -10,7 +10,7 @@ namespace mapcodec {
 
 /// What one coding of a tile costs and loses.
 struct CodingFigures {
-  double bits = 0;
+  double bits = 0;                   ///< infinite: not to be taken
   double forward = 0, backward = 0;  ///< sums of squared distances [m^2], to and from the decoded points
 };
 using Codings = std::vector<CodingFigures>;

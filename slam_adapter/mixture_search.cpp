@@ -124,10 +124,20 @@ std::optional<std::vector<std::size_t>> MixtureSearch::best() const {
   }
   const double square = rms_m_ * rms_m_;
   const MixtureLimit limit{points_in * square, points_out * square};
-  auto choice = cheapest_within(figures_, limit);
+  auto choice = cheapest_within(within_tile_rms(figures_), limit);
   // Density is a wish, spending the promise is asked for.
-  if (choice && rms_of(*choice) < kLeast * rms_m_) choice = cheapest_within(sizes_, limit);
+  if (choice && rms_of(*choice) < kLeast * rms_m_) choice = cheapest_within(within_tile_rms(sizes_), limit);
   return choice;
+}
+
+std::vector<Codings> MixtureSearch::within_tile_rms(std::vector<Codings> tiles) const {
+  for (std::size_t i = 0; i < tiles.size(); ++i) {
+    for (std::size_t k = 0; k < tiles[i].size(); ++k) {
+      const EncodedTile& t = tried_[i][k].coded;
+      if (std::max(t.rms_forward_m, t.rms_backward_m) > most_rms_m_) tiles[i][k].bits = INFINITY;
+    }
+  }
+  return tiles;
 }
 
 Result<std::optional<std::vector<TileTry>>> MixtureSearch::run(TileSettings surfaces, bool with_points) {

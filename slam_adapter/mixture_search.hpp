@@ -3,6 +3,7 @@
 // points, and one Lagrangian over all says which coding of its own each tile takes.
 #pragma once
 
+#include <cmath>
 #include <functional>
 #include <optional>
 #include <span>
@@ -27,8 +28,9 @@ using CodeTiles = std::function<Result<std::vector<std::optional<TileTry>>>(
 class MixtureSearch {
  public:
   /// All must outlive the search. @param rms_m  of all points together, in both directions.
-  MixtureSearch(std::size_t tiles, double rms_m, const CodeTiles& code)
-      : rms_m_(rms_m), code_(code), tried_(tiles), sizes_(tiles), figures_(tiles) {}
+  /// @param most_rms_m  of one tile.
+  MixtureSearch(std::size_t tiles, double rms_m, const CodeTiles& code, double most_rms_m = INFINITY)
+      : rms_m_(rms_m), most_rms_m_(most_rms_m), code_(code), tried_(tiles), sizes_(tiles), figures_(tiles) {}
 
   /// @param surfaces  their trade, effort and the step to begin with. @param with_points  tiles may be coded
   /// as points too. @return one coding for each tile; nothing if no mixture of those tried keeps the rms.
@@ -45,7 +47,9 @@ class MixtureSearch {
   [[nodiscard]] double rms_of(std::span<const std::size_t> choice) const;
   [[nodiscard]] std::optional<std::vector<std::size_t>> best() const;
 
-  double rms_m_;
+  [[nodiscard]] std::vector<Codings> within_tile_rms(std::vector<Codings> tiles) const;
+
+  double rms_m_, most_rms_m_;
   const CodeTiles& code_;
   TileSettings points_;
   std::vector<std::vector<TileTry>> tried_;  // for each tile

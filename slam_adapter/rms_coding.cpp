@@ -10,6 +10,8 @@
 namespace mapcodec {
 namespace {
 
+// Of the rms of all: what lies farther from its tile's surfaces would not be known when it is seen again.
+constexpr double kMostTileRms = 1.5;
 constexpr std::size_t kTradeShare = 8;  // of the points, one in so many
 
 double first_step(const MapSchema& schema, double rms_m) {
@@ -31,7 +33,8 @@ class TilesForRms {
     const CodeTiles code = [this](std::span<const std::size_t> tiles, const TileSettings& settings) {
       return try_all(tiles, settings);
     };
-    MAPCODEC_ASSIGN(const auto settled, MixtureSearch(tiles_.size(), rms_m_, code).run(surfaces, true));
+    MAPCODEC_ASSIGN(const auto settled,
+                    MixtureSearch(tiles_.size(), rms_m_, code, kMostTileRms * rms_m_).run(surfaces, true));
     if (!settled) return make_error(ErrorCode::kPromiseBroken, "no coding of the tiles keeps the promise");
     std::vector<EncodedTile> coded(tiles_.size());
     MAPCODEC_TRY(run_(tiles_.size(), [&](std::size_t i) -> Status {
