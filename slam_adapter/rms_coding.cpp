@@ -12,8 +12,6 @@ namespace {
 
 // Of the rms of all: what lies farther from its tile's surfaces would not be known when it is seen again.
 constexpr double kMostTileRms = 1.5;
-// Of what may be spent: with less than the rest no later scan of known points would fit into the promise.
-constexpr double kSpent = 0.985;
 constexpr std::size_t kTradeShare = 8;  // of the points, one in so many
 
 double first_step(const MapSchema& schema, double rms_m) {
@@ -23,7 +21,7 @@ double first_step(const MapSchema& schema, double rms_m) {
 class TilesForRms {
  public:
   TilesForRms(std::span<const RmsTile> tiles, const MapSchema& schema, double rms_m, const RunEach& run)
-      : tiles_(tiles), schema_(schema), bare_(positions_alone(schema)), rms_m_(kSpent * rms_m), run_(run) {}
+      : tiles_(tiles), schema_(schema), bare_(positions_alone(schema)), rms_m_(rms_m), run_(run) {}
 
   Result<std::vector<EncodedTile>> encode() {
     CodingPlan plan;

@@ -43,18 +43,33 @@ std::shared_ptr<StoredPoints> nothing_stored(const TileWork& w, const MapSchema&
   return make_stored_points(schema, cube.min);
 }
 
+// Squared distances to surfaces spread about as widely as their mean: so many standard errors of it.
+constexpr double kChance = 1.5;
+constexpr std::size_t kFew = 2000;  // of more points the mean is certain enough
+
+double rms_by_chance(const TileWork& w, const ScanPart& scan) {
+  if (!is_by_chance(w, scan)) return 0;
+  return w.allowed_rms_m * std::sqrt(1 + kChance / std::sqrt(double(scan.points.size())));
+}
+
 /// What of one scan is new.
-PointCloud take_new(TileWork& w, PointCloud scan, const MapSchema& schema) {
+PointCloud take_new(TileWork& w, ScanPart part, const MapSchema& schema) {
+  const double by_chance_m = rms_by_chance(w, part);
+  PointCloud scan = std::move(part.points);
   if (w.stored == nullptr) return scan;
   const bool with_channels = schema.promise == PromiseKind::lossless;
   const Novelty novelty = with_channels ? w.stored->look(without_dropped(scan, schema), w.allowed_rms_m)
-                                        : w.stored->look(scan, w.allowed_rms_m);
+                                        : w.stored->look(scan, w.allowed_rms_m, by_chance_m);
   w.known += double(scan.size() - novelty.added.size());
   w.known_m2 += novelty.squared_m2;
   return novelty.added.size() == scan.size() ? std::move(scan) : scan.gather(novelty.added);
 }
 
 }  // namespace
+
+bool is_by_chance(const TileWork& w, const ScanPart& scan) {
+  return w.by_chance && !scan.points.empty() && scan.points.size() <= kFew;
+}
 
 Status look_up(TileWork& w, const MapSchema& schema, const PendingCoding& coding) {
   if (w.stored == nullptr && !w.segments.empty()) {
@@ -63,7 +78,7 @@ Status look_up(TileWork& w, const MapSchema& schema, const PendingCoding& coding
     w.segments.clear();
   }
   for (std::size_t i = 0; i < w.scans.size(); ++i) {
-    PointCloud added = take_new(w, std::move(w.scans[i].points), schema);
+    PointCloud added = take_new(w, std::move(w.scans[i]), schema);
     const bool more = i + 1 < w.scans.size();
     // A tile that begins with one scan needs no index of it.
     if (w.cap && more && w.stored == nullptr) w.stored = nothing_stored(w, schema);

@@ -39,6 +39,7 @@ struct TileWork {
   bool begins = false;                   ///< the tile had nothing before
   bool cap = true;                       ///< known points add nothing
   double allowed_rms_m = 0;              ///< that points may have to what stands for them
+  bool by_chance = false;                ///< few points of a scan may have more, as they happen to
 
   TileBorders borders;               ///< if it will be coded for good
   PointCloud added;                  ///< what is new, of all scans; consumed by code_added
@@ -47,6 +48,8 @@ struct TileWork {
   std::optional<EncodedTile> coded;  ///< of what is new
 };
 
+/// Whether points of this scan may have more than `allowed_rms_m`: few scatter about the mean of their tile.
+[[nodiscard]] bool is_by_chance(const TileWork& w, const ScanPart& scan);
 /// Finds what is new. Threads: those of different tiles at once. Errors: those of decoding.
 [[nodiscard]] Status look_up(TileWork& w, const MapSchema& schema, const PendingCoding& coding);
 /// Codes what is new, if anything is.

@@ -32,7 +32,9 @@ Status MapUpdater::State::flush_some(Batch tiles) {
   Batch generous;
   for (auto& [place, scans] : tiles) {
     MAPCODEC_ASSIGN(TileWork w, prepare(place));
-    if (w.allowed_rms_m > schema.promise_value) generous[place] = scans;
+    const auto by_chance = [&](const ScanPart& part) { return is_by_chance(w, part); };
+    if (w.allowed_rms_m > schema.promise_value || std::any_of(scans.begin(), scans.end(), by_chance))
+      generous[place] = scans;
     w.scans = std::move(scans);
     work.push_back(std::move(w));
   }
@@ -99,6 +101,7 @@ Result<TileWork> MapUpdater::State::prepare(const TilePlace& place) {
   w.cap = settings.density_cap;
   if (settings.for_good && w.begins) w.borders = borders_of(place);
   w.allowed_rms_m = schema.promise_value;
+  w.by_chance = settings.density_cap && schema.promise == PromiseKind::rms;
   if (!settings.density_cap || record == nullptr) return w;
   // A tile may have more than the map on the whole, and then its own points coming again are no news.
   w.allowed_rms_m = std::max(w.allowed_rms_m, record->errors.rms_m);
@@ -109,8 +112,8 @@ Result<TileWork> MapUpdater::State::prepare(const TilePlace& place) {
   return w;
 }
 
-/// @param generous  scans of tiles that may have more than the promise: where the map on the whole would not
-/// keep it, they are looked at again, with so much less.
+/// @param generous  scans of tiles whose points may have more than the promise: where the map on the whole
+/// would not keep it, they are looked at again, with so much less.
 Status MapUpdater::State::look_up_all(std::vector<TileWork>& work, const Batch& generous) {
   const auto look = [&](std::size_t i) { return look_up(work[i], schema, coding); };
   MAPCODEC_TRY(run_all(work.size(), look));
@@ -130,6 +133,7 @@ Status MapUpdater::State::look_up_all(std::vector<TileWork>& work, const Batch& 
     const double mean_m2 = w.known_m2 / w.known;
     cache.forget(w.place);
     MAPCODEC_ASSIGN(w, prepare(w.place));
+    w.by_chance = false;
     w.allowed_rms_m = std::sqrt(limit + left * (mean_m2 - limit));
     w.scans = scans->second;
   }

@@ -101,10 +101,17 @@ class NearStored final : public StoredPoints {
     }
   }
 
-  Novelty look(const PointCloud& cloud, double rms_m) const override {
+  Novelty look(const PointCloud& cloud, double rms_m, double by_chance_m) const override {
     std::vector<float> squares(cloud.size());
-    for (std::size_t i = 0; i < cloud.size(); ++i) squares[i] = nearest(cloud.xyz[i]);
-    return choose(cloud, squares, (rms_m / rms_m_) * (rms_m / rms_m_));
+    double sum = 0, known = 0;
+    for (std::size_t i = 0; i < cloud.size(); ++i) {
+      squares[i] = nearest(cloud.xyz[i]);
+      sum += is_reached(squares[i]) ? squares[i] : 0;
+      known += is_reached(squares[i]);
+    }
+    const double by_chance = (by_chance_m / rms_m_) * (by_chance_m / rms_m_);
+    const double allowed = (rms_m / rms_m_) * (rms_m / rms_m_);
+    return choose(cloud, squares, sum <= by_chance * known ? std::max(allowed, by_chance) : allowed);
   }
 
   [[nodiscard]] std::size_t bytes() const override {
@@ -275,7 +282,7 @@ class CellCounts final : public StoredPoints {
       ++counts_.at(keys[i]);
     }
   }
-  Novelty look(const PointCloud& cloud, double) const override {
+  Novelty look(const PointCloud& cloud, double, double) const override {
     const std::vector<std::uint64_t> keys = keys_of(cloud);
     KeyTable<std::uint32_t> seen;  // of cells that are known
     seen.reserve(cloud.size() / 4);
@@ -314,7 +321,7 @@ class EqualPoints final : public StoredPoints {
       k.count += k.second == second;
     }
   }
-  Novelty look(const PointCloud& cloud, double) const override {
+  Novelty look(const PointCloud& cloud, double, double) const override {
     KeyTable<std::uint32_t> seen;
     Novelty r;
     for (std::uint32_t i = 0; i < cloud.size(); ++i) {

@@ -25,7 +25,7 @@ struct Novelty {
 /// Stored points of one tile, ready to be asked. What a point is held against depends on the map's promise:
 ///  - rms R: the nearest stored point. Those farther than 2.5 R are new; of the rest whole pieces of surface
 ///    are, those first that go most beyond R together, until the root mean square distance of those left is
-///    R: the promise holds for all that came in.
+///    R: the promise holds for all that came in. Few points that have a little more may have it by chance.
 ///  - max_error: the cell of the lattice. As many points of a cell are new as it has more than are stored.
 ///  - lossless: equal position and channels, counted in the same way.
 /// A scan that comes again thus adds nothing. Threads: const methods from many at once.
@@ -36,8 +36,8 @@ class StoredPoints {
   /// @param pending  that folding will code once more: what they stand for gets that error, too.
   virtual void add(const PointCloud& cloud, bool pending) = 0;
   /// @param cloud    as for add. @param rms_m  that may be left, >= the promise where the tile itself has
-  /// more; only for rms.
-  [[nodiscard]] virtual Novelty look(const PointCloud& cloud, double rms_m) const = 0;
+  /// more; only for rms. @param by_chance_m  none is new where all together have no more than this.
+  [[nodiscard]] virtual Novelty look(const PointCloud& cloud, double rms_m, double by_chance_m = 0) const = 0;
   /// Memory that it takes [bytes], about.
   [[nodiscard]] virtual std::size_t bytes() const = 0;
 };

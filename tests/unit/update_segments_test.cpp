@@ -155,6 +155,18 @@ TEST(Novelty, RmsKeepsItsPromiseForWhatIsLeftOut) {
   EXPECT_EQ(stored->look(grid(10, 0.02, 0.5), 0.01).added.size(), 100u);
 }
 
+TEST(Novelty, PointsThatHaveLittleMoreByChanceAreKnown) {
+  const MapSchema s = schema_of(PromiseKind::rms, 0.01);
+  const auto stored = make_stored_points(s, {0, 0, 0});
+  stored->add(grid(10, 0.027), false);
+  const PointCloud scan = grid(10, 0.027, 0.0105);
+  EXPECT_EQ(stored->look(scan, 0.01).added.size(), scan.size());
+  EXPECT_EQ(stored->look(scan, 0.01, 0.0104).added.size(), scan.size());
+  const Novelty n = stored->look(scan, 0.01, 0.0106);
+  EXPECT_TRUE(n.added.empty());
+  EXPECT_NEAR(n.squared_m2, 0.0105 * 0.0105 * double(scan.size()), 1e-6);
+}
+
 TEST(Novelty, CellsCountTheirPoints) {
   const MapSchema s = schema_of(PromiseKind::max_error, 0.01);
   const auto stored = make_stored_points(s, {0, 0, 0});
