@@ -16,10 +16,11 @@ constexpr double kAim = 0.992, kNear = 0.98, kLeast = 0.95, kSpent = 0.997;  // 
 constexpr double kAimNear = 0.985;                                           // so that most of them keep it
 // Where the promise is not spent, coarser steps are tried: errors do not grow evenly with them.
 constexpr double kCoarser[] = {1.01, 1.02, 1.04, 1.07};
-// With high effort so many plans near the best are tried side by side, whatever the number of threads; and so
-// many times, unless nothing better has come for a while.
+// So many plans near the best are tried side by side, whatever the number of threads; and so many times,
+// unless nothing clearly better has come for a while. The last two are for high effort.
 constexpr std::size_t kBrood = 4;
-constexpr int kBroods = 10, kPatience = 3;
+constexpr int kBroods = 6, kPatience = 2, kBroodsOfHigh = 10, kPatienceOfHigh = 3;
+constexpr double kClearlyBetter = 0.995;  // of the best score before
 // How far they lie, as logarithms. A tile of few cells leaps by several hundredths in size and error where a
 // setting moves by one.
 constexpr double kPriceSpread = 0.15, kWeightSpread = 0.15, kStepSpread = 0.02;
@@ -108,7 +109,9 @@ CodingPlan WholeSearch::near_best(std::mt19937_64& random, const Range& steps) c
 
 Status WholeSearch::try_near(const Range& steps) {
   std::mt19937_64 random(1);
-  for (int brood = 0, idle = 0; brood < kBroods && idle < kPatience; ++brood, ++idle) {
+  const bool high = best_->plan.tiles.effort == Effort::high;
+  const int broods = high ? kBroodsOfHigh : kBroods, patience = high ? kPatienceOfHigh : kPatience;
+  for (int brood = 0, idle = 0; brood < broods && idle < patience; ++brood, ++idle) {
     std::vector<CodingPlan> plans;
     for (std::size_t i = 0; i < kBrood; ++i) plans.push_back(near_best(random, steps));
     std::vector<std::optional<Result<Kept>>> tried(kBrood);
@@ -120,7 +123,7 @@ Status WholeSearch::try_near(const Range& steps) {
       if (!t->ok()) return t->error();
       look_at(std::move(**t));
     }
-    if (best_->score < score) idle = -1;
+    if (best_->score < kClearlyBetter * score) idle = -1;
   }
   return {};
 }
@@ -132,7 +135,7 @@ Result<std::optional<WholeSearch::Kept>> WholeSearch::run(CodingPlan plan, const
     return try_steps(trial, steps);
   }));
   if (best_) MAPCODEC_TRY(try_coarser(steps.coarsest_m));
-  if (best_ && best_->plan.tiles.effort == Effort::high) MAPCODEC_TRY(try_near(steps));
+  if (best_ && best_->plan.tiles.effort != Effort::fast) MAPCODEC_TRY(try_near(steps));
   return std::move(best_);
 }
 
