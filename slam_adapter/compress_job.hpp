@@ -14,8 +14,7 @@
 #include "slam_adapter/coding_memory.hpp"
 #include "slam_adapter/compress.hpp"
 #include "slam_adapter/level_errors.hpp"
-#include "slam_adapter/log_secant.hpp"
-#include "slam_adapter/plan_choice.hpp"
+#include "slam_adapter/plan_adjuster.hpp"
 
 namespace mapcodec {
 
@@ -43,22 +42,6 @@ class CompressJob {
   [[nodiscard]] Status store(const TileKey& key, EncodedTile&& t);
   [[nodiscard]] Status commit();
 
-  [[nodiscard]] bool has_target() const { return options_.target_bits_per_point || options_.target_ratio; }
-  [[nodiscard]] std::optional<std::size_t> bounded_color() const;
-  /// Colours of surface tiles are coded to a slope of the whole map.
-  [[nodiscard]] bool has_color_slope() const {
-    return color_slope_ > 0 && choice_.plan.has_surfaces() && bounded_color().has_value();
-  }
-  bool is_kept_or_adjust();
-  bool meets_target_or_adjust();
-  bool meets_rms_or_adjust();
-  bool meets_color_or_adjust();
-  enum class ColorState { met, missed, finer_positions };
-  ColorState adjust_map_color(double asked_bound);
-  void say_if_finer_for_color();
-  void say_if_color_misses();
-  void record_reachable_color();
-
   PointSource& source_;
   const std::string path_;
   const CompressOptions& options_;
@@ -74,16 +57,9 @@ class CompressJob {
   CodedSum coded_;
   std::map<TileKey, TileChoice, MortonLess> chosen_;  // for the tiles, by the search or their first coding
   Box bounds_;
-  double position_step_ = 0;                     // what the positions' promise alone would allow
-  double searched_step_ = 0;                     // where the search ended on the whole map; 0: it did not
-  double best_step_ = 0, best_bits_ = INFINITY;  // of the codings that kept the promise, the smallest
-  std::optional<LogSecant> secant_;              // over the codings of the whole map
-  int target_tries_ = 0, rms_tries_ = 0, color_tries_ = 0;
-  std::optional<LogSecant> color_secant_;
-  double color_slope_ = 0;        // of surface tiles, the same for all; 0: each meets the bound
-  bool positions_found_ = false;  // until then colours are not coded where they follow a slope
+  double position_step_ = 0;  // what the positions' promise alone would allow
+  std::optional<PlanAdjuster> adjuster_;
   CodingMemory memory_;
-  double color_target_ = 1;  // share of the colour bound that tiles aim at
   CompressReport report_;
 };
 

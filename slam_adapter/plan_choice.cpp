@@ -18,21 +18,10 @@ constexpr double kDearBits = 3;
 // RMS that needs next to no bits for positions on a known surface, in spacings.
 constexpr double kSamplingFloor = 1.1;
 
-bool has_target(const CompressOptions& o) {
-  return o.target_bits_per_point || o.target_ratio;
-}
-
 CodecId codec_of(PromiseKind promise) {
   return promise == PromiseKind::lossless ? CodecId::lossless
          : promise == PromiseKind::paper  ? CodecId::paper
                                           : CodecId::points;
-}
-
-std::optional<std::size_t> bounded_color(const MapSchema& schema) {
-  for (std::size_t i = 0; i < schema.channels.size(); ++i) {
-    if (schema.channels[i].info.name == "rgb" && schema.channels[i].kept == ChannelKept::bounded) return i;
-  }
-  return std::nullopt;
 }
 
 /// The choice on one sample.
@@ -229,6 +218,17 @@ class Chooser {
 };
 
 }  // namespace
+
+bool has_target(const CompressOptions& o) {
+  return o.target_bits_per_point || o.target_ratio;
+}
+
+std::optional<std::size_t> bounded_color(const MapSchema& schema) {
+  for (std::size_t i = 0; i < schema.channels.size(); ++i) {
+    if (schema.channels[i].info.name == "rgb" && schema.channels[i].kept == ChannelKept::bounded) return i;
+  }
+  return std::nullopt;
+}
 
 CodecChoice allowed_codecs(const CompressOptions& options) {
   return options.promise == PromiseKind::rms && options.keep_counts ? options.codecs : CodecChoice::points;

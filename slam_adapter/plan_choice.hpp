@@ -38,6 +38,11 @@ struct PlanChoice {
                                              MapSchema& schema, Arena& arena,
                                              std::vector<std::string>& warnings);
 
+/// A size was asked for, not an error.
+[[nodiscard]] bool has_target(const CompressOptions& options);
+/// The colour channel that is kept within a bound: an index into `schema.channels`.
+[[nodiscard]] std::optional<std::size_t> bounded_color(const MapSchema& schema);
+
 /// Bits per point that the promise refers to.
 [[nodiscard]] double target_bits(const CompressOptions& options, const MapSchema& schema);
 
