@@ -1,15 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "slam_adapter/compress_job.hpp"
 
-#include <unistd.h>
-
 #include <algorithm>
 #include <filesystem>
 
-#include "parallel/encode_pipeline.hpp"
 #include "parallel/runner.hpp"
 #include "parallel/tile_plan.hpp"
 #include "slam_adapter/schema_choice.hpp"
+#include "slam_adapter/stopwatch.hpp"
 
 namespace mapcodec {
 namespace {
@@ -24,23 +22,10 @@ constexpr double kPaperTilePoints = 1000000;
 // A target below this is one that only surfaces meet.
 constexpr double kSurfaceBits = 3;
 
-// Of the memory budget: for what codings of the same positions have in common.
-constexpr std::uint64_t kMemoryShare = 8;
-
-using Clock = std::chrono::steady_clock;
-
-double lap(Clock::time_point& from) {
-  const auto now = Clock::now();
-  const double seconds = std::chrono::duration<double>(now - from).count();
-  from = now;
-  return seconds;
-}
-
-std::uint64_t memory_budget(const CompressOptions& options) {
-  if (options.max_memory_bytes != 0) return options.max_memory_bytes;
-  const long pages = sysconf(_SC_PHYS_PAGES), page = sysconf(_SC_PAGESIZE);
-  return pages > 0 && page > 0 ? std::uint64_t(pages) * std::uint64_t(page) / 2 : std::uint64_t{2} << 30;
-}
+// Where positions take less than this share of the bytes, finer ones can save more of the colours than they
+// cost: so much finer they are tried, taken where the map is clearly smaller, and tried again where it is
+// much smaller.
+constexpr double kFewForPositions = 0.1, kFiner = 0.55, kClearlySmaller = 0.95, kMuchSmaller = 0.85;
 
 std::string folder_of(const std::string& path) {
   const auto parent = std::filesystem::path(path).parent_path();
@@ -57,18 +42,22 @@ double rough_spacing(const Survey& survey) {
 }  // namespace
 
 Result<CompressReport> CompressJob::run() {
-  auto begin = Clock::now(), at = begin;
+  Stopwatch all, watch;
   MAPCODEC_TRY(look_at_source());
-  report_.survey_seconds = lap(at);
+  report_.survey_seconds = watch.lap();
   MAPCODEC_TRY(make_tiles());
-  report_.tiling_seconds = lap(at);
-  MAPCODEC_ASSIGN(choice_, choose_plan(options_, *tiles_, schema_, arena_, report_.warnings));
-  report_.search_seconds = lap(at);
-  for (std::size_t i = 0; i < choice_.tiles.size(); ++i)
-    chosen_.emplace(tiles_->tiles()[i].key, choice_.tiles[i]);
-  adjuster_.emplace(options_, schema_, choice_, position_step_);
-  MAPCODEC_TRY(encode_until_kept());
-  report_.seconds = lap(begin);
+  report_.tiling_seconds = watch.lap();
+  MAPCODEC_TRY(code(1));
+  for (bool again = true; again && colors_dominate();) {
+    const double bits = coding_->coded().bits_per_point();
+    MAPCODEC_TRY(try_finer());
+    again = coding_->coded().bits_per_point() < kMuchSmaller * bits;
+  }
+  take_report();
+  watch.lap();
+  MAPCODEC_TRY(commit());
+  report_.commit_seconds = watch.lap();
+  report_.seconds = all.lap();
   report_.threads = arena_.threads();
   report_.points = survey_.points;
   report_.dropped_points = survey_.dropped;
@@ -99,7 +88,6 @@ Status CompressJob::make_tiles() {
   MAPCODEC_ASSIGN(plan_, plan_tiles(survey_, plan));
   MAPCODEC_ASSIGN(schema_,
                   choose_schema(survey_, options_, plan_.origin(), plan_.tile_size_m(), report_.warnings));
-  position_step_ = schema_.step_m;
   TileSetSettings s;
   s.memory_budget_bytes = memory_budget(options_);
   s.temp_dir = options_.temp_folder.empty() ? folder_of(path_) : options_.temp_folder;
@@ -112,7 +100,7 @@ Status CompressJob::make_tiles() {
   if (!tiles.ok()) return tiles.error();
   tiles_ = std::make_unique<TileSet>(std::move(tiles).value());
   neighbors_ = std::make_unique<TileNeighbors>(*tiles_, schema_.origin, schema_.tile_size_m);
-  levels_ = std::make_unique<LevelSampler>(*tiles_);
+  input_.emplace(CodingInput{*tiles_, plan_, *neighbors_, arena_, path_});
   return {};
 }
 
@@ -133,127 +121,78 @@ double CompressJob::smallest_step() const {
   return 0;
 }
 
-Status CompressJob::encode_until_kept() {
-  constexpr int kTries = 16;
-  for (int i = 0;; ++i) {
-    auto at = Clock::now();
-    MAPCODEC_TRY(encode_once());
-    report_.tiles_seconds += lap(at);
-    report_.codings = i + 1;
-    if (adjuster_->is_kept_or_adjust(coded_)) break;
-    if (i + 1 == kTries)
-      return make_error(ErrorCode::kPromiseBroken, "no step was found that keeps the promise");
-  }
-  adjuster_->say_what_color_cost(report_.warnings);
-  adjuster_->record_reachable_color();
-  auto at = Clock::now();
-  MAPCODEC_TRY(commit());
-  report_.commit_seconds = lap(at);
-  return {};
+/// Codes the map so that its error is at most this share of what is asked.
+Status CompressJob::code(double share) {
+  CompressOptions options = options_;
+  options.promise_m *= share;
+  MapSchema schema = schema_;
+  schema.promise_value *= share;
+  // Where positions are few of the bytes there is little to find.
+  auto coding = std::make_unique<MapCoding>(*input_, options, std::move(schema),
+                                            share == 1 ? options.effort : Effort::fast);
+  const Status status = coding->run();
+  const CompressReport& r = coding->report();
+  report_.search_seconds += r.search_seconds;
+  report_.tiles_seconds += r.tiles_seconds;
+  report_.codings += r.codings;
+  if (status.ok()) coding_ = std::move(coding);
+  return status;
 }
 
-Status CompressJob::encode_once() {
-  coded_ = {};
-  bounds_ = {};
-  report_.geometry_bytes = 0;
-  report_.tile_seconds.clear();
-  levels_->clear();
-  schema_.step_m = choice_.plan.step_m;
-  choice_.plan.tiles.color_slope = adjuster_->color_slope();
-  MapInfo info;
-  info.schema = write_schema(schema_);
-  info.origin = plan_.origin();
-  info.tile_size_m = schema_.tile_size_m;
-  writer_.reset();
-  MAPCODEC_ASSIGN(MapWriter writer, MapWriter::create(path_, info, options_.overwrite));
-  writer_ = std::make_unique<MapWriter>(std::move(writer));
-  PipelineSettings pipeline;
-  pipeline.arena = &arena_;
-  pipeline.memory_budget_bytes = memory_budget(options_);
-  pipeline.progress = options_.progress;
-  pipeline.stop = options_.stop;
-  pipeline.tile_seconds = &report_.tile_seconds;
-  if (is_coded()) return store_coded();
-  MapSchema target = schema_;
-  if (const auto color = bounded_color(schema_)) target.channels[*color].bound *= adjuster_->color_target();
-  const bool positions_only = adjuster_->wants_positions_alone();
-  if (positions_only) target = positions_alone(target);
-  if (positions_only) memory_.begin(memory_budget(options_) / kMemoryShare);
-  MAPCODEC_TRY(encode_tiles(
-      *tiles_, [&](const PointCloud& tile) { return encode(tile, target); }, pipeline,
-      [this](const TileKey& key, EncodedTile&& t) { return store(key, std::move(t)); }));
-  add_saved_seconds();
-  return {};
+/// Whether the bytes are nearly all for colours.
+bool CompressJob::colors_dominate() const {
+  return options_.promise == PromiseKind::rms && !has_target(options_) && options_.effort != Effort::fast &&
+         bounded_color(coding_->schema()) && coding_->has_surfaces() &&
+         coding_->coded().geometry_bits_per_point() < kFewForPositions * coding_->coded().bits_per_point();
 }
 
-/// What a tile's coding takes is told as if nothing had been remembered.
-void CompressJob::add_saved_seconds() {
-  for (std::size_t i = 0; i < report_.tile_seconds.size(); ++i)
-    report_.tile_seconds[i] += memory_.seconds_saved(tiles_->tiles()[i].key);
+/// Tries finer positions, and keeps them if the map is clearly smaller so.
+Status CompressJob::try_finer() {
+  auto before = std::move(coding_);
+  before->drop_archive();
+  const Status status = code(kFiner * before->schema().promise_value / schema_.promise_value);
+  if (!status.ok() && status.error().code != ErrorCode::kPromiseBroken) return status.error();
+  const double color_error = std::max(options_.color_error, before->coded().errors().color_error);
+  const bool smaller = status.ok() && coding_->coded().errors().color_error <= color_error &&
+                       coding_->coded().bits_per_point() < kClearlySmaller * before->coded().bits_per_point();
+  if (smaller) return {};
+  coding_.reset();
+  coding_ = std::move(before);
+  return coding_->write_again();
 }
 
-/// Whether the search has coded the whole map already: positions are all of it, and it was not coded since.
-bool CompressJob::is_coded() const {
-  const auto dropped = [](const ChannelSchema& c) { return c.kept == ChannelKept::dropped; };
-  return report_.codings == 0 && choice_.coded && choice_.coded->tiles.size() == tiles_->tiles().size() &&
-         std::all_of(schema_.channels.begin(), schema_.channels.end(), dropped);
-}
-
-Status CompressJob::store_coded() {
-  for (std::size_t i = 0; i < tiles_->tiles().size(); ++i)
-    MAPCODEC_TRY(store(tiles_->tiles()[i].key, std::move(choice_.coded->tiles[i])));
-  report_.tile_seconds = choice_.coded->seconds;
-  if (options_.progress)
-    options_.progress({"encode", survey_.points, survey_.points, report_.geometry_bytes});
-  choice_.coded.reset();
-  return {};
-}
-
-/// Later codings keep to the codecs of the first: with a little other step some tiles would change over, and
-/// the error of the map would leap to the other side of the promise.
-Result<EncodedTile> CompressJob::encode(const PointCloud& tile, const MapSchema& target) {
-  CodingPlan plan = choice_.plan;
-  const auto key = plan_.tile_of(tile.xyz.front());
-  if (!key) return encode_by_plan(tile, target, plan);
-  plan.tiles.borders = neighbors_->borders_of(*key);
-  const bool chosen = report_.codings > 0 || !choice_.tiles.empty();
-  if (plan.choice == CodecChoice::cheapest && chosen) {
-    const auto own = chosen_.find(*key);
-    if (own != chosen_.end()) {
-      plan.fixed = own->second.codec;
-      plan.step_m *= own->second.step_share;
-    }
-  }
-  return adjuster_->has_color_slope() ? memory_.encode(*key, tile, target, plan)
-                                      : encode_by_plan(tile, target, plan);
-}
-
-Status CompressJob::store(const TileKey& key, EncodedTile&& t) {
-  coded_.add(t);
-  levels_->keep(key, t);
-  if (choice_.tiles.empty()) chosen_.emplace(key, TileChoice{t.codec});
-  bounds_.add(t.bounds);
-  report_.geometry_bytes += t.geometry_bytes;
-  return writer_->add(key, static_cast<std::uint8_t>(t.codec), t.points, t.bounds, t.errors, t.bytes);
+void CompressJob::take_report() {
+  const CompressReport& r = coding_->report();
+  report_.geometry_bytes = r.geometry_bytes;
+  report_.tile_seconds = r.tile_seconds;
+  report_.warnings.insert(report_.warnings.end(), r.warnings.begin(), r.warnings.end());
+  if (coding_->schema().promise_value < schema_.promise_value && options_.promise == PromiseKind::rms &&
+      !has_target(options_))
+    report_.warnings.push_back("positions are kept within an RMS of " +
+                               millimetres(coding_->schema().promise_value) +
+                               ": finer ones make the colours, and the map, smaller");
 }
 
 Status CompressJob::commit() {
+  MapSchema schema = coding_->schema();
+  if (!has_target(options_)) schema.promise_value = schema_.promise_value;
   MapInfo info;
-  info.schema = write_schema(schema_);
+  info.schema = write_schema(schema);
   info.origin = plan_.origin();
-  info.tile_size_m = schema_.tile_size_m;
+  info.tile_size_m = schema.tile_size_m;
   info.input_points = survey_.points;
   info.input_bytes = options_.input_bytes;
   info.dropped_points = survey_.dropped;
-  info.achieved = coded_.errors();
-  info.bounds = bounds_;
+  info.achieved = coding_->coded().errors();
+  info.bounds = coding_->bounds();
   TbbRunner runner(arena_);
-  MAPCODEC_ASSIGN(const LevelErrors levels, levels_->measure(schema_, runner));
+  MAPCODEC_ASSIGN(const LevelErrors levels, coding_->levels().measure(schema, runner));
   if (levels.levels.size() > 1) info.extras[kLevelsExtra] = write_level_errors(levels);
-  MAPCODEC_TRY(writer_->set_info(std::move(info)));
-  if (options_.beside) MAPCODEC_TRY(options_.beside(*writer_));
+  MapWriter& writer = coding_->writer();
+  MAPCODEC_TRY(writer.set_info(std::move(info)));
+  if (options_.beside) MAPCODEC_TRY(options_.beside(writer));
   // No clock in the archive of a new map: the same input gives the same bytes.
-  const auto revision = writer_->commit(0);
+  const auto revision = writer.commit(0);
   return revision.ok() ? Status{} : Status(revision.error());
 }
 

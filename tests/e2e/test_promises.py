@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What each promise says, measured here and not by the program."""
+import math
 import random
 import unittest
 from collections import Counter
@@ -149,6 +150,29 @@ class Promises(ProgramTest):
             q = min(index.candidates(p), key=lambda v: sum((a - b) ** 2 for a, b in zip(p, v)))
             total += sum(((rgb >> s & 255) - (color[q][0] >> s & 255)) ** 2 for s in (0, 8, 16)) ** 0.5
         return total / len(decoded.rows)
+
+    def test_positions_are_finer_where_that_makes_colors_smaller(self):
+        """A sheet in waves, painted like a chessboard."""
+        r = random.Random(5)
+        rows = []
+        for _ in range(30000):
+            x, y = r.random() * 4, r.random() * 4
+            z = 0.1 * math.sin(2 * math.pi * x / 0.6) * math.sin(2 * math.pi * y / 0.6)
+            rgb = 0xC83C3C if int(x / 0.4) + int(y / 0.4) & 1 else 0x3C3CC8
+            rows.append((*(to_float32(v) for v in (x, y, z)), rgb))
+        source = write(self.path("in.pcd"), pcd_bytes(Cloud(RGB, rows)))
+        said = self.succeeds("compress", source, "-o", self.path("map.mapc"), "--rms", 0.1, "--threads", 1).err
+        self.assertRegex(said, r"RMS of \S+ mm: finer ones make the colours")
+        info = self.succeeds("info", self.path("map.mapc"), "--json").json
+        self.assertEqual(info["promise"], {"kind": "rms", "value": 0.1})
+        self.assertLess(info["achieved"]["rms_m"], 0.06)
+        fast = self.compress(source, "--rms", 0.1, "--effort", "fast", name="fast.mapc")  # does not look
+        self.assertLess(self.path("map.mapc").stat().st_size, 0.8 * fast.stat().st_size)
+        again = self.compress(source, "--rms", 0.1, "--threads", 2, name="again.mapc")
+        self.assertEqual(again.read_bytes(), self.path("map.mapc").read_bytes())
+        again = self.compress(source, "--rms", 0.1, "--force", name="again.mapc")  # over one that is there
+        self.assertEqual(again.read_bytes(), self.path("map.mapc").read_bytes())
+        self.succeeds("verify", again, "--against", source)
 
     def test_scalars_are_exact_unless_said_otherwise(self):
         cloud = room(3000, FULL)
