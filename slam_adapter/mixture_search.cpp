@@ -23,11 +23,36 @@ constexpr double kNearlyFree = 0.5;  // bits per point
 // A uniform cell's root mean square distance from its centre, in sides.
 constexpr double kRmsOfCell = 0.5;
 constexpr double kVoxelRms = 0.995;  // of the rms: what a voxel is made for
+// Directions whose errors differ by more are worth a search with another weight, changed by so much.
+constexpr double kBalanced = 0.1, kOtherWeight = 0.55;
 
 CodingFigures figures_of(const EncodedTile& t) {
   const auto in = double(t.input_points), out = double(t.points);
   return {8 * double(t.bytes.size()), in * t.rms_forward_m * t.rms_forward_m,
           out * t.rms_backward_m * t.rms_backward_m};
+}
+
+/// What a mixture lost and takes, with what density is worth.
+CodingFigures sum_of(std::span<const TileTry> tiles) {
+  CodingFigures sum;
+  for (const TileTry& t : tiles) {
+    const CodingFigures f = figures_of(t.coded);
+    sum.bits += f.bits + double(t.coded.input_points) * worth_of_density(t.coded.errors.density_error);
+    sum.forward += f.forward;
+    sum.backward += f.backward;
+  }
+  return sum;
+}
+
+/// Forward RMS over backward RMS.
+double balance_of(std::span<const TileTry> tiles) {
+  double in = 0, out = 0;
+  for (const TileTry& t : tiles) {
+    in += double(t.coded.input_points);
+    out += double(t.coded.points);
+  }
+  const CodingFigures sum = sum_of(tiles);
+  return sum.forward > 0 && sum.backward > 0 ? std::sqrt(sum.forward / in / (sum.backward / out)) : 1;
 }
 
 /// The next step, at which not quite the same is seen again.
@@ -180,6 +205,22 @@ Result<std::optional<std::vector<TileTry>>> MixtureSearch::run(TileSettings surf
   settled.emplace();
   for (std::size_t i = 0; i < tried_.size(); ++i) settled->push_back(std::move(tried_[i][(*choice)[i]]));
   return settled;
+}
+
+Result<std::optional<std::vector<TileTry>>> search_mixture(std::size_t tiles, double rms_m,
+                                                           const CodeTiles& code,
+                                                           const TileSettings& surfaces, bool with_points,
+                                                           double most_rms_m) {
+  MAPCODEC_ASSIGN(auto best, MixtureSearch(tiles, rms_m, code, most_rms_m).run(surfaces, with_points));
+  if (!best || surfaces.effort == Effort::fast) return best;
+  const double balance = balance_of(*best);
+  if (std::abs(balance - 1) <= kBalanced) return best;
+  TileSettings other = surfaces;
+  double& weight = other.trade.forward_weight;
+  weight = std::min(balance < 1 ? weight * kOtherWeight : weight / kOtherWeight, 1.0);
+  MAPCODEC_ASSIGN(auto second, MixtureSearch(tiles, rms_m, code, most_rms_m).run(other, with_points));
+  if (second && sum_of(*second).bits < sum_of(*best).bits) return second;
+  return best;
 }
 
 }  // namespace mapcodec

@@ -57,4 +57,12 @@ class MixtureSearch {
   std::vector<std::size_t> surfaces_;        // tiles for which more surfaces are tried
 };
 
+/// The search of MixtureSearch (whose parameters these are), and again where one direction of the error is
+/// left far below the other: with surfaces that weigh the worse one more. The smaller of the two.
+[[nodiscard]] Result<std::optional<std::vector<TileTry>>> search_mixture(std::size_t tiles, double rms_m,
+                                                                         const CodeTiles& code,
+                                                                         const TileSettings& surfaces,
+                                                                         bool with_points,
+                                                                         double most_rms_m = INFINITY);
+
 }  // namespace mapcodec

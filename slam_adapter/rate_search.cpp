@@ -164,7 +164,7 @@ Result<std::optional<std::vector<TileTry>>> RateSearch::for_each_tile(CodingPlan
   };
   TileSettings surfaces = plan.tiles;
   surfaces.step_m = plan.step_m;
-  MAPCODEC_ASSIGN(auto settled, MixtureSearch(sample_.pieces.size(), rms_m, code).run(surfaces, with_points));
+  MAPCODEC_ASSIGN(auto settled, search_mixture(sample_.pieces.size(), rms_m, code, surfaces, with_points));
   plan.choice = CodecChoice::cheapest;
   const auto is_surface = [](const TileTry& t) { return t.settings.codec == CodecId::surface; };
   if (settled && std::none_of(settled->begin(), settled->end(), is_surface)) settled.reset();

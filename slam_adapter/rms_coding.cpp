@@ -34,7 +34,7 @@ class TilesForRms {
       return try_all(tiles, settings);
     };
     MAPCODEC_ASSIGN(const auto settled,
-                    MixtureSearch(tiles_.size(), rms_m_, code, kMostTileRms * rms_m_).run(surfaces, true));
+                    search_mixture(tiles_.size(), rms_m_, code, surfaces, true, kMostTileRms * rms_m_));
     if (!settled) return make_error(ErrorCode::kPromiseBroken, "no coding of the tiles keeps the promise");
     std::vector<EncodedTile> coded(tiles_.size());
     MAPCODEC_TRY(run_(tiles_.size(), [&](std::size_t i) -> Status {
