@@ -81,6 +81,7 @@ TEST(MixtureChoice, TakesWhatLosesNothingAtNoLimit) {
 struct Codec {
   double surface_bits = 1, points_bits = 3;  // per point at a step of 1 cm
   std::vector<double> walls{};               // tiles that surfaces code in no bits
+  double backward = 1;  // of surfaces at the usual weight, in forward errors; a lower weight makes it less
 
   CodeTiles code() {
     return [this](std::span<const std::size_t> tiles,
@@ -95,6 +96,9 @@ struct Codec {
         t.coded.input_points = t.coded.points = 1000;
         t.coded.bytes.resize(static_cast<std::size_t>(bits * 1000 / 8));
         t.coded.rms_forward_m = t.coded.rms_backward_m = (surface ? 1.3 : 0.5) * s.step_m;
+        const double weight = std::pow(s.trade.forward_weight / SurfaceTrade{}.forward_weight, 0.3);
+        if (surface) t.coded.rms_forward_m /= weight;
+        if (surface) t.coded.rms_backward_m *= weight * backward;
         tries.push_back(std::move(t));
       }
       return tries;
@@ -135,6 +139,32 @@ TEST(MixtureSearch, CodesTilesAsPointsWhereSurfacesCostMore) {
   const auto alone = MixtureSearch(2, 0.01, code).run(surfaces, false);
   ASSERT_TRUE(alone.ok() && *alone);
   EXPECT_EQ((**alone)[1].settings.codec, CodecId::surface);
+}
+
+TEST(MixtureSearch, WeighsTheWorseDirectionMore) {
+  const auto more_bytes = [](double backward, double& weight) {
+    Codec codec;
+    codec.walls = {1, 1, 0.1, 0.1};
+    codec.backward = backward;
+    const CodeTiles code = codec.code();
+    TileSettings surfaces;
+    surfaces.step_m = 0.01;
+    const auto found = search_mixture(4, 0.01, code, surfaces, false);
+    double bytes = 0;
+    for (const TileTry& t : **found) bytes += double(t.coded.bytes.size());
+    weight = (**found)[0].settings.trade.forward_weight;
+    const auto plain = MixtureSearch(4, 0.01, code).run(surfaces, false);
+    for (const TileTry& t : **plain) bytes -= double(t.coded.bytes.size());
+    return bytes;
+  };
+  const double usual = SurfaceTrade{}.forward_weight;
+  double weight = 0;
+  EXPECT_EQ(more_bytes(1.05, weight), 0);  // balanced: nothing more is tried
+  EXPECT_EQ(weight, usual);
+  EXPECT_LT(more_bytes(1.4, weight), 0);
+  EXPECT_LT(weight, usual);
+  EXPECT_LT(more_bytes(0.7, weight), 0);
+  EXPECT_GT(weight, usual);
 }
 
 TEST(MixtureSearch, FindsNothingWhereTilesCannotBeCoded) {
