@@ -11,7 +11,7 @@
 namespace mapcodec {
 namespace {
 
-constexpr int kTries = 6;
+constexpr int kTries = 6, kFinerTries = 8;
 constexpr double kAim = 0.99, kEnough = 0.98, kLeast = 0.95;  // of the rms
 constexpr double kRmsPerStep = 0.7;  // by how much its logarithm grows with that of the step
 // Codings of one tile at nearly equal steps differ as by chance, which the choice can use.
@@ -200,7 +200,13 @@ Result<std::optional<std::vector<TileTry>>> MixtureSearch::run(TileSettings surf
   }
   std::optional<std::vector<TileTry>> settled;
   if (!is_complete()) return settled;
-  const auto choice = best();
+  auto choice = best();
+  // A tile of few points may lie beyond its limit in all of these.
+  double step_m = points_.step_m;
+  for (int i = 0; i < kFinerTries && with_points && !choice; ++i) {
+    MAPCODEC_TRY(try_points(step_m /= 2));
+    choice = best();
+  }
   if (!choice) return settled;
   settled.emplace();
   for (std::size_t i = 0; i < tried_.size(); ++i) settled->push_back(std::move(tried_[i][(*choice)[i]]));

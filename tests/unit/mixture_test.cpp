@@ -167,6 +167,29 @@ TEST(MixtureSearch, WeighsTheWorseDirectionMore) {
   EXPECT_GT(weight, usual);
 }
 
+TEST(MixtureSearch, CodesATileOfFewPointsAsFineAsItsLimitAsks) {
+  // Both codecs lose far more there than elsewhere, as with clusters at the corners of cells.
+  Codec codec;
+  codec.walls = {1, 1, 1, 1};
+  const CodeTiles usual = codec.code();
+  const CodeTiles code = [&](std::span<const std::size_t> tiles, const TileSettings& s) {
+    auto tries = usual(tiles, s);
+    for (std::size_t i = 0; i < tiles.size(); ++i) {
+      if (tiles[i] != 2) continue;
+      EncodedTile& t = (*tries)[i]->coded;
+      t.input_points = t.points = 2;
+      t.rms_forward_m = t.rms_backward_m = 20 * s.step_m;
+    }
+    return tries;
+  };
+  TileSettings surfaces;
+  surfaces.step_m = 0.01;
+  const auto found = MixtureSearch(4, 0.01, code, 0.015).run(surfaces, true);
+  ASSERT_TRUE(found.ok() && *found);
+  EXPECT_LE((**found)[2].coded.rms_forward_m, 0.015);
+  EXPECT_GE(rms_of(**found), 0.5 * 0.01);
+}
+
 TEST(MixtureSearch, FindsNothingWhereTilesCannotBeCoded) {
   const CodeTiles none = [](std::span<const std::size_t> tiles, const TileSettings&) {
     return Result<std::vector<std::optional<TileTry>>>(std::vector<std::optional<TileTry>>(tiles.size()));
