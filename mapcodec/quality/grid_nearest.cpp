@@ -12,12 +12,14 @@
 namespace mapcodec {
 namespace {
 
-constexpr int kMostBits = 20;              // cells across the grid, log2
+constexpr int kMostBits = 20;              // cells across the finest grid, log2
+constexpr int kUsualBits = 3;              // more of them than points need
 constexpr std::size_t kPointsPerCell = 8;  // aimed at
-constexpr std::size_t kCrowded = 128;      // mean over the points of how many share their cell
+constexpr double kCrowded = 64;            // mean over the points of how many may share their cell
+constexpr double kTooCrowded = 256;        // where even the finest grid's are so many, a k-d tree is faster
 constexpr double kSlack = 1e-7;            // of a cell: more than rounding can move a point
-constexpr double kMostCell = (1 << kMostBits) - 1;
-constexpr double kFarthest = 6;  // cells that are looked at one by one
+constexpr double kFarthest = 1.2;          // cells that are looked at one by one
+constexpr int kCoarser = 3;                // halvings from one grid to the next
 
 /// [axis][from][to]: the cells of a block of 4 x 4 x 4 with a coordinate in [from, to], as bits in Morton
 /// order.
@@ -52,132 +54,92 @@ double squared_distance(const Vec3& a, const Vec3& b) {
   return x * x + y * y + z * z;
 }
 
-}  // namespace
+/// Mean over the points of how many share their cell, if the keys' last bits are left out.
+double crowd_of(std::span<const std::uint64_t> keys, int shift) {
+  double sum = 0;
+  for (std::size_t begin = 0, end = 0; begin < keys.size(); begin = end) {
+    while (end < keys.size() && ((keys[end] ^ keys[begin]) >> (3 * shift)) == 0) ++end;
+    sum += double(end - begin) * double(end - begin);
+  }
+  return sum / double(keys.size());
+}
 
-/// Two levels of cells: blocks of 4 x 4 x 4 in a hash table, each with a mask of the cells that hold points.
-/// Above the blocks an octree, for queries with nothing near.
-struct GridNearest::Impl {
-  explicit Impl(std::span<const Vec3> points);
+/// By how many halvings the finest cells should be coarser than the keys': the coarsest with not many points
+/// each on average, or finer ones where most points are in a few of these.
+int finest_cells(std::span<const std::uint64_t> keys, int bits) {
+  std::array<std::size_t, kMostBits + 2> parts{};
+  for (std::size_t i = 1; i < keys.size(); ++i) {
+    ++parts[static_cast<std::size_t>((std::bit_width(keys[i] ^ keys[i - 1]) + 2) / 3)];
+  }
+  std::size_t cells = keys.size() - parts[0];
+  int shift = 0;
+  while (shift < bits &&
+         (cells - parts[static_cast<std::size_t>(shift) + 1]) * kPointsPerCell >= keys.size()) {
+    cells -= parts[static_cast<std::size_t>(++shift)];
+  }
+  while (shift > 0 && crowd_of(keys, shift) > kCrowded) --shift;
+  return shift;
+}
 
-  [[nodiscard]] Best search(const Vec3& query, std::uint32_t hint) const;
+std::size_t hash_of(std::uint64_t key) {
+  key *= 0x9e3779b97f4a7c15u;
+  return static_cast<std::size_t>(key ^ (key >> 31));
+}
 
-  std::vector<Vec3> sorted;
-  std::vector<std::uint32_t> ids;
-  std::unique_ptr<NeighborIndex> tree;  ///< instead of all below, where too many points share a cell
+/// A query in the terms of the keys' cells.
+struct Query {
+  Vec3 at;
+  std::array<double, 3> place;
+};
+
+/// Points in the cells of one size: blocks of 4 x 4 x 4 in a hash table, each with a mask of the cells that
+/// hold points.
+class Grid {
+ public:
+  /// @param sorted  the points in the keys' order; must outlive this.
+  Grid(std::span<const Vec3> sorted, std::span<const std::uint64_t> keys, int bits, int shift)
+      : sorted_(sorted), per_side_(1 / double(1 << shift)), most_(double((1 << bits) >> shift) - 1) {
+    build_cells(keys, shift);
+    build_table();
+  }
+  [[nodiscard]] std::size_t blocks() const { return blocks_.size(); }
+
+  /// Looks at all cells that may hold a nearer point than the best; false if they are too many for that, and
+  /// then only at the query's own. @param per_cell  of the keys' cells in a metre.
+  [[nodiscard]] bool look_around(const Query& q, double per_cell, bool last, Best& best) const;
 
  private:
   struct Block {
     std::uint64_t key, mask;
     std::uint32_t first;  ///< cell
   };
-  struct Node {
-    std::uint64_t key;
-    std::uint32_t first;  ///< node of the level below, or block
-  };
-  /// A query in the grid's terms.
-  struct Query {
-    Vec3 at;
-    std::array<double, 3> place;  ///< in cells
-    std::array<std::int64_t, 3> cell;
-  };
-
-  void place_cells(std::span<const Vec3> points, int bits);
-  [[nodiscard]] bool crowded() const;
-  void build_cells(const std::vector<KeyedIndex>& keys, int shift);
-  void build_table();
-  void build_octree();
-  [[nodiscard]] const Block* find(std::uint64_t key) const;
-  void scan(std::size_t cell, const Query& q, Best& best) const;
-  [[nodiscard]] bool look_around(const Query& q, Best& best) const;
-  void scan_part(const Block& block, std::uint64_t part, const Query& q, Best& best) const;
-  void descend(std::size_t level, std::uint32_t begin, std::uint32_t end, const Query& q, Best& best) const;
-  [[nodiscard]] double squared_to(std::uint64_t key, int level, const Query& q) const;
-
-  Vec3 corner_{};
-  double side_ = 1, per_side_ = 1;
-  bool finest_ = false;               ///< cells could not be coarser
-  std::vector<std::uint32_t> cells_;  ///< first point of each, and the end
-  std::vector<Block> blocks_;
   struct Slot {
     std::uint64_t key = kFree;
     std::uint32_t block = 0;
   };
   static constexpr std::uint64_t kFree = ~std::uint64_t{0};
+
+  void build_cells(std::span<const std::uint64_t> keys, int shift);
+  void build_table();
+  [[nodiscard]] const Block* find(std::uint64_t key) const;
+  void scan(std::size_t cell, const Vec3& at, Best& best) const;
+  void scan_part(const Block& block, std::uint64_t part, const Vec3& at, Best& best) const;
+  [[nodiscard]] std::uint32_t cell_at(double place) const {
+    return static_cast<std::uint32_t>(std::clamp(place, 0.0, most_));
+  }
+
+  std::span<const Vec3> sorted_;
+  double per_side_;                   ///< of the keys' cells
+  double most_;                       ///< coordinate of a cell
+  std::vector<std::uint32_t> cells_;  ///< first point of each, and the end
+  std::vector<Block> blocks_;
   std::vector<Slot> table_;
-  std::vector<std::vector<Node>> levels_;  ///< [0] joins blocks, the last is one node
 };
 
-GridNearest::Impl::Impl(std::span<const Vec3> points) {
-  const int bits = std::clamp((static_cast<int>(std::bit_width(points.size())) + 1) / 2 + 2, 4, kMostBits);
-  place_cells(points, bits);
-  if (crowded() && finest_ && bits < kMostBits) place_cells(points, kMostBits);
-  if (crowded()) {
-    tree = std::make_unique<NeighborIndex>(sorted);
-    return;
-  }
-  build_table();
-  build_octree();
-}
-
-/// Whether so many points share cells that looking at all of a cell takes too long: equal ones, or a few far
-/// away.
-bool GridNearest::Impl::crowded() const {
-  double crowd = 0;
-  for (std::size_t c = 0; c + 1 < cells_.size(); ++c) {
-    const double n = cells_[c + 1] - cells_[c];
-    crowd += n * n;
-  }
-  return crowd > double(kCrowded * sorted.size()) + 1e4;
-}
-
-void GridNearest::Impl::place_cells(std::span<const Vec3> points, int bits) {
-  Box box;
-  for (const Vec3& p : points) box.add(p);
-  double extent = 0;
-  for (std::size_t d = 0; d < 3; ++d) extent = std::max(extent, box.max[d] - box.min[d]);
-  corner_ = box.min;
-  side_ = extent > 0 && std::isnormal(extent) ? extent / double(1 << bits) : 1;
-  const double most = double(1 << bits) - 1;
-  std::vector<KeyedIndex> keys(points.size()), scratch;
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    VoxelCoord c;
-    for (std::size_t d = 0; d < 3; ++d) {
-      c[d] = static_cast<std::uint32_t>(std::min(most, (points[i][d] - corner_[d]) / side_));
-    }
-    keys[i] = {morton_encode(c), static_cast<std::uint32_t>(i)};
-  }
-  radix_sort(keys, scratch, 3 * bits);
-  ids.clear();
-  sorted.clear();
-  ids.reserve(points.size());
-  sorted.reserve(points.size());
-  for (const KeyedIndex& k : keys) {
-    ids.push_back(k.index);
-    sorted.push_back(points[k.index]);
-  }
-  // The coarsest cells with not many points each.
-  std::array<std::size_t, kMostBits + 2> parts{};
-  for (std::size_t i = 1; i < keys.size(); ++i) {
-    ++parts[static_cast<std::size_t>((std::bit_width(keys[i].key ^ keys[i - 1].key) + 2) / 3)];
-  }
-  std::size_t cells = points.size() - parts[0];
-  int shift = 0;
-  while (shift < bits &&
-         (cells - parts[static_cast<std::size_t>(shift) + 1]) * kPointsPerCell >= points.size()) {
-    cells -= parts[static_cast<std::size_t>(++shift)];
-  }
-  finest_ = shift == 0;
-  side_ *= double(1 << shift);
-  per_side_ = 1 / side_;
-  build_cells(keys, shift);
-}
-
-void GridNearest::Impl::build_cells(const std::vector<KeyedIndex>& keys, int shift) {
-  cells_.clear();
-  blocks_.clear();
+void Grid::build_cells(std::span<const std::uint64_t> keys, int shift) {
   std::uint64_t last = ~std::uint64_t{0};
   for (std::size_t i = 0; i < keys.size(); ++i) {
-    const std::uint64_t key = keys[i].key >> (3 * shift);
+    const std::uint64_t key = keys[i] >> (3 * shift);
     if (key == last) continue;
     last = key;
     if (blocks_.empty() || blocks_.back().key != key >> 6) {
@@ -189,14 +151,7 @@ void GridNearest::Impl::build_cells(const std::vector<KeyedIndex>& keys, int shi
   cells_.push_back(static_cast<std::uint32_t>(keys.size()));
 }
 
-namespace {
-std::size_t hash_of(std::uint64_t key) {
-  key *= 0x9e3779b97f4a7c15u;
-  return static_cast<std::size_t>(key ^ (key >> 31));
-}
-}  // namespace
-
-void GridNearest::Impl::build_table() {
+void Grid::build_table() {
   table_.assign(std::bit_ceil(2 * blocks_.size() + 2), Slot{});
   const std::size_t mask = table_.size() - 1;
   for (std::uint32_t b = 0; b < blocks_.size(); ++b) {
@@ -206,20 +161,7 @@ void GridNearest::Impl::build_table() {
   }
 }
 
-void GridNearest::Impl::build_octree() {
-  levels_.clear();
-  const auto join = [](const auto& below) {
-    std::vector<Node> nodes;
-    for (std::uint32_t i = 0; i < below.size(); ++i) {
-      if (nodes.empty() || nodes.back().key != below[i].key >> 3) nodes.push_back({below[i].key >> 3, i});
-    }
-    return nodes;
-  };
-  levels_.push_back(join(blocks_));
-  while (levels_.back().size() > 1) levels_.push_back(join(levels_.back()));
-}
-
-const GridNearest::Impl::Block* GridNearest::Impl::find(std::uint64_t key) const {
+const Grid::Block* Grid::find(std::uint64_t key) const {
   const std::size_t mask = table_.size() - 1;
   for (std::size_t i = hash_of(key) & mask; table_[i].key != kFree; i = (i + 1) & mask) {
     if (table_[i].key == key) return &blocks_[table_[i].block];
@@ -227,35 +169,39 @@ const GridNearest::Impl::Block* GridNearest::Impl::find(std::uint64_t key) const
   return nullptr;
 }
 
-void GridNearest::Impl::scan(std::size_t cell, const Query& q, Best& best) const {
+void Grid::scan(std::size_t cell, const Vec3& at, Best& best) const {
+  // Selections, not branches: which point is nearer cannot be foreseen.
+  Best b = best;
   for (std::uint32_t i = cells_[cell]; i < cells_[cell + 1]; ++i) {
-    const double s = squared_distance(q.at, sorted[i]);
-    if (s < best.squared) best = {s, i};
+    const double s = squared_distance(at, sorted_[i]);
+    const bool nearer = s < b.squared;
+    b.at = nearer ? i : b.at;
+    b.squared = nearer ? s : b.squared;
   }
+  best = b;
 }
 
 /// The cells of a block that are in `part`.
-void GridNearest::Impl::scan_part(const Block& block, std::uint64_t part, const Query& q, Best& best) const {
+void Grid::scan_part(const Block& block, std::uint64_t part, const Vec3& at, Best& best) const {
   for (std::uint64_t m = block.mask & part; m != 0; m &= m - 1) {
     const std::uint64_t bit = m & (0 - m);
-    scan(block.first + count_bits(block.mask & (bit - 1)), q, best);
+    scan(block.first + count_bits(block.mask & (bit - 1)), at, best);
   }
 }
 
-/// Looks at all cells that may hold a nearer point than the best; false if they are too many for that.
-bool GridNearest::Impl::look_around(const Query& q, Best& best) const {
-  const VoxelCoord own{static_cast<std::uint32_t>(q.cell[0]), static_cast<std::uint32_t>(q.cell[1]),
-                       static_cast<std::uint32_t>(q.cell[2])};
+bool Grid::look_around(const Query& q, double per_cell, bool last, Best& best) const {
+  const VoxelCoord own{cell_at(q.place[0] * per_side_), cell_at(q.place[1] * per_side_),
+                       cell_at(q.place[2] * per_side_)};
   const std::uint64_t own_key = morton_encode(own);
   const Block* const home = find(own_key >> 6);
   const std::uint64_t own_bit = std::uint64_t{1} << (own_key & 63);
-  if (home != nullptr) scan_part(*home, own_bit, q, best);
-  const double reach = std::sqrt(best.squared) * per_side_ + kSlack;
-  if (!(reach < kFarthest)) return false;
+  if (home != nullptr) scan_part(*home, own_bit, q.at, best);
+  const double reach = std::sqrt(best.squared) * per_cell * per_side_ + kSlack;
+  if (!last && !(reach < kFarthest)) return false;
   VoxelCoord low, high;
   for (std::size_t d = 0; d < 3; ++d) {
-    low[d] = static_cast<std::uint32_t>(std::max(0.0, q.place[d] - reach));
-    high[d] = static_cast<std::uint32_t>(std::min(kMostCell, q.place[d] + reach));
+    low[d] = cell_at(q.place[d] * per_side_ - reach);
+    high[d] = cell_at(q.place[d] * per_side_ + reach);
   }
   const auto slab = [&](std::size_t d, std::uint32_t block) {
     return kSlabs[d][std::max(low[d], 4 * block) & 3][std::min(high[d], 4 * block + 3) & 3];
@@ -267,46 +213,79 @@ bool GridNearest::Impl::look_around(const Query& q, Best& best) const {
         const std::uint64_t key = morton_encode(VoxelCoord{x, y, z});
         const bool at_home = key == own_key >> 6;
         const Block* const block = at_home ? home : find(key);
-        if (block != nullptr) scan_part(*block, row & slab(0, x) & ~(at_home ? own_bit : 0), q, best);
+        if (block != nullptr) scan_part(*block, row & slab(0, x) & ~(at_home ? own_bit : 0), q.at, best);
       }
     }
   }
   return true;
 }
 
-double GridNearest::Impl::squared_to(std::uint64_t key, int level, const Query& q) const {
-  const VoxelCoord c = morton_decode(key);
-  const double width = double(std::uint64_t{1} << level);
-  double sum = 0;
-  for (std::size_t d = 0; d < 3; ++d) {
-    const double low = double(c[d]) * width;
-    const double off = std::max({0.0, low - q.place[d] - kSlack, q.place[d] - low - width - kSlack}) * side_;
-    sum += off * off;
-  }
-  return sum;
+}  // namespace
+
+/// Grids from fine to coarse, the last of one block.
+struct GridNearest::Impl {
+  explicit Impl(std::span<const Vec3> points);
+
+  [[nodiscard]] Best search(const Vec3& query, std::uint32_t hint) const;
+
+  std::vector<std::uint32_t> order;     ///< all points
+  std::vector<Vec3> sorted;             ///< those that differ from the one before them
+  std::vector<std::uint32_t> ids;       ///< theirs
+  std::unique_ptr<NeighborIndex> tree;  ///< instead of all below, where too many points share a cell
+
+ private:
+  [[nodiscard]] bool place(std::span<const Vec3> points, int bits);
+
+  Vec3 corner_{};
+  double per_side_ = 1;  ///< of the keys' cells
+  std::vector<Grid> grids_;
+};
+
+GridNearest::Impl::Impl(std::span<const Vec3> points) {
+  const int bits =
+      std::clamp((static_cast<int>(std::bit_width(points.size())) + 1) / 2 + kUsualBits, 4, kMostBits);
+  if (!place(points, bits) && !place(points, kMostBits)) tree = std::make_unique<NeighborIndex>(sorted);
 }
 
-void GridNearest::Impl::descend(std::size_t level, std::uint32_t begin, std::uint32_t end, const Query& q,
-                                Best& best) const {
-  // level 0: blocks; level l: nodes of levels_[l - 1]. Nearest first.
-  std::array<std::pair<double, std::uint32_t>, 8> by_distance;
-  std::size_t n = 0;
-  for (std::uint32_t i = begin; i < end && n < by_distance.size(); ++i) {
-    const std::uint64_t key = level == 0 ? blocks_[i].key : levels_[level - 1][i].key;
-    by_distance[n++] = {squared_to(key, static_cast<int>(level) + 2, q), i};
-  }
-  std::sort(by_distance.begin(), by_distance.begin() + static_cast<std::ptrdiff_t>(n));
-  for (std::size_t k = 0; k < n; ++k) {
-    const auto [squared, i] = by_distance[k];
-    if (squared >= best.squared) return;
-    if (level == 0) {
-      scan_part(blocks_[i], ~std::uint64_t{0}, q, best);
-    } else {
-      const std::vector<Node>& nodes = levels_[level - 1];
-      const std::size_t below = level == 1 ? blocks_.size() : levels_[level - 2].size();
-      descend(level - 1, nodes[i].first,
-              i + 1 < nodes.size() ? nodes[i + 1].first : static_cast<std::uint32_t>(below), q, best);
+/// False if many points share cells even of a 2^-bits of the extent: equal ones, or a few far away.
+bool GridNearest::Impl::place(std::span<const Vec3> points, int bits) {
+  Box box;
+  for (const Vec3& p : points) box.add(p);
+  double extent = 0;
+  for (std::size_t d = 0; d < 3; ++d) extent = std::max(extent, box.max[d] - box.min[d]);
+  corner_ = box.min;
+  per_side_ = extent > 0 && std::isnormal(extent) ? double(1 << bits) / extent : 1;
+  const double most = double(1 << bits) - 1;
+  std::vector<KeyedIndex> keys(points.size()), scratch;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    VoxelCoord c;
+    for (std::size_t d = 0; d < 3; ++d) {
+      c[d] = static_cast<std::uint32_t>(std::min(most, (points[i][d] - corner_[d]) * per_side_));
     }
+    keys[i] = {morton_encode(c), static_cast<std::uint32_t>(i)};
+  }
+  radix_sort(keys, scratch, 3 * bits);
+  order.clear();
+  ids.clear();
+  sorted.clear();
+  order.reserve(points.size());
+  ids.reserve(points.size());
+  sorted.reserve(points.size());
+  std::vector<std::uint64_t> cells;
+  cells.reserve(points.size());
+  for (const KeyedIndex& k : keys) {
+    order.push_back(k.index);
+    // A scanner's missing returns are often many points at one place.
+    if (!cells.empty() && cells.back() == k.key && sorted.back() == points[k.index]) continue;
+    cells.push_back(k.key);
+    ids.push_back(k.index);
+    sorted.push_back(points[k.index]);
+  }
+  int shift = finest_cells(cells, bits);
+  if (shift == 0 && crowd_of(cells, 0) > kTooCrowded) return false;
+  for (;; shift = std::min(shift + kCoarser, bits)) {
+    grids_.emplace_back(sorted, cells, bits, shift);
+    if (grids_.back().blocks() == 1) return true;
   }
 }
 
@@ -316,15 +295,11 @@ Best GridNearest::Impl::search(const Vec3& query, std::uint32_t hint) const {
     best.at = tree->nearest(query, best.squared);
     return best;
   }
-  Query q{query, {}, {}};
-  bool inside = true;
-  for (std::size_t d = 0; d < 3; ++d) {
-    q.place[d] = (query[d] - corner_[d]) * per_side_;
-    inside = inside && q.place[d] >= 0 && q.place[d] < kMostCell;
-    q.cell[d] = inside ? static_cast<std::int64_t>(q.place[d]) : 0;
+  Query q{query, {}};
+  for (std::size_t d = 0; d < 3; ++d) q.place[d] = (query[d] - corner_[d]) * per_side_;
+  for (const Grid& grid : grids_) {
+    if (grid.look_around(q, per_side_, &grid == &grids_.back(), best)) break;
   }
-  if (inside && look_around(q, best)) return best;
-  descend(levels_.size(), 0, 1, q, best);
   return best;
 }
 
@@ -334,7 +309,7 @@ GridNearest::GridNearest(GridNearest&&) noexcept = default;
 GridNearest& GridNearest::operator=(GridNearest&&) noexcept = default;
 
 std::span<const std::uint32_t> GridNearest::order() const {
-  return impl_->ids;
+  return impl_->order;
 }
 
 Nearest GridNearest::find(std::span<const Vec3> from, std::span<const std::uint32_t> order) const {
