@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "mapcodec/codec/surface_blocks.hpp"
 
+#include <bit>
+
 namespace mapcodec::surface {
 namespace {
 
@@ -16,12 +18,31 @@ unsigned bit_of(std::int64_t x, std::int64_t y, std::int64_t z) {
   return static_cast<unsigned>((x & 3) | ((y & 3) << 2) | ((z & 3) << 4));
 }
 
+/// [axis][i]: the voxels of a cube within two of its voxel i - 2 along an axis.
+constexpr auto kSlabs = [] {
+  std::array<std::array<std::uint64_t, 8>, 3> t{};
+  for (int voxel = 0; voxel < 64; ++voxel) {
+    for (int axis = 0; axis < 3; ++axis) {
+      for (int i = 0; i < 8; ++i) {
+        const int off = ((voxel >> (2 * axis)) & 3) - (i - 2);
+        if (off >= -2 && off <= 2)
+          t[static_cast<std::size_t>(axis)][static_cast<std::size_t>(i)] |= std::uint64_t{1} << voxel;
+      }
+    }
+  }
+  return t;
+}();
+/// @param at  of a voxel in a cube's terms, in [-2, 5].
+std::size_t window(std::int64_t at) {
+  return static_cast<std::size_t>(at + 2);
+}
+
 /// Sums over the neighbours' offsets [voxels].
 struct Sums {
   std::int64_t n = 0;
-  std::array<std::int64_t, 3> first{};
-  std::array<std::array<std::int64_t, 3>, 3> second{};
-  void add(const std::array<std::int64_t, 3>& o) {
+  std::array<std::int32_t, 3> first{};
+  std::array<std::array<std::int32_t, 3>, 3> second{};
+  void add(const std::array<std::int32_t, 3>& o) {
     ++n;
     for (unsigned d = 0; d < 3; ++d) {
       first[d] += o[d];
@@ -30,7 +51,7 @@ struct Sums {
   }
   /// n^2 times the covariance.
   [[nodiscard]] std::int64_t covariance(unsigned d, unsigned e) const {
-    return n * second[d][e] - first[d] * first[e];
+    return n * second[d][e] - std::int64_t{first[d]} * first[e];
   }
 };
 
@@ -52,7 +73,7 @@ Fit fit_along(const Sums& s, unsigned k) {
   Fit f;
   f.a = ((uz * vv - vz * uv) << kSlopeBits) / det;
   f.b = ((vz * uu - uz * uv) << kSlopeBits) / det;
-  f.h = ((s.first[k] << kSlopeBits) - f.a * s.first[u] - f.b * s.first[v]) / s.n;
+  f.h = ((std::int64_t{s.first[k]} << kSlopeBits) - f.a * s.first[u] - f.b * s.first[v]) / s.n;
   const std::int64_t vertical = (zz << kSlopeBits) - f.a * uz - f.b * vz;
   f.residual = (vertical << kSlopeBits) / ((1 << kSlopeBits) + ((f.a * f.a + f.b * f.b) >> kSlopeBits));
   return f;
@@ -99,19 +120,21 @@ std::uint64_t VoxelSet::cells_of(std::uint64_t key) const {
 Plane VoxelSet::fit(const std::array<std::uint32_t, 3>& at) const {
   const std::int64_t x = at[0] >> v_, y = at[1] >> v_, z = at[2] >> v_;
   Sums sums;
-  std::uint64_t last = kFree, cells = 0;
-  for (std::int64_t dz = -2; dz <= 2; ++dz) {
-    for (std::int64_t dy = -2; dy <= 2; ++dy) {
-      for (std::int64_t dx = -2; dx <= 2; ++dx) {
-        if (dx * dx + dy * dy + dz * dz > 4) continue;
-        const std::int64_t nx = x + dx, ny = y + dy, nz = z + dz;
-        if (nx < 0 || ny < 0 || nz < 0) continue;
-        const std::uint64_t key = key_of(nx >> 2, ny >> 2, nz >> 2);
-        if (key != last) {
-          cells = cells_of(key);
-          last = key;
+  // Five voxels along an axis lie in two cubes.
+  const std::int64_t x0 = (x - 2) >> 2, y0 = (y - 2) >> 2, z0 = (z - 2) >> 2;
+  for (std::int64_t cz = std::max<std::int64_t>(z0, 0); cz <= z0 + 1; ++cz) {
+    const std::uint64_t in_z = kSlabs[2][window(z - 4 * cz)];
+    for (std::int64_t cy = std::max<std::int64_t>(y0, 0); cy <= y0 + 1; ++cy) {
+      const std::uint64_t in_zy = in_z & kSlabs[1][window(y - 4 * cy)];
+      for (std::int64_t cx = std::max<std::int64_t>(x0, 0); cx <= x0 + 1; ++cx) {
+        std::uint64_t cells = cells_of(key_of(cx, cy, cz)) & in_zy & kSlabs[0][window(x - 4 * cx)];
+        for (; cells != 0; cells &= cells - 1) {
+          const std::int64_t bit = std::countr_zero(cells);
+          const auto dx = static_cast<std::int32_t>(4 * cx + (bit & 3) - x);
+          const auto dy = static_cast<std::int32_t>(4 * cy + ((bit >> 2) & 3) - y);
+          const auto dz = static_cast<std::int32_t>(4 * cz + (bit >> 4) - z);
+          if (dx * dx + dy * dy + dz * dz <= 4) sums.add({dx, dy, dz});
         }
-        if (((cells >> bit_of(nx, ny, nz)) & 1) != 0) sums.add({dx, dy, dz});
       }
     }
   }

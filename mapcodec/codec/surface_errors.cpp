@@ -20,13 +20,24 @@ double cosine(unsigned sixteenth) {
 std::array<double, 16> reach_of(std::span<const Units> points, const TreeCell& cell, unsigned u, unsigned v) {
   const Units c = cell.twice_center();
   const double scale_u = 2.0 / double(1u << cell.shape[u]), scale_v = 2.0 / double(1u << cell.shape[v]);
-  std::array<double, 16> reach;
-  reach.fill(-10);
+  // Opposite directions are one product's most and least.
+  std::array<double, 8> most, least;
+  most.fill(-10);
+  least.fill(10);
   const std::size_t stride = 1 + cell.count() / 256;
   for (std::size_t i = cell.begin; i < cell.end; i += stride) {
     const double x = (points[i][u] + 0.5 - 0.5 * c[u]) * scale_u,
                  y = (points[i][v] + 0.5 - 0.5 * c[v]) * scale_v;
-    for (unsigned a = 0; a < 16; ++a) reach[a] = std::max(reach[a], x * cosine(a) + y * cosine(a + 12));
+    for (unsigned a = 0; a < 8; ++a) {
+      const double along = x * cosine(a) + y * cosine(a + 12);
+      most[a] = along > most[a] ? along : most[a];
+      least[a] = along < least[a] ? along : least[a];
+    }
+  }
+  std::array<double, 16> reach;
+  for (unsigned a = 0; a < 8; ++a) {
+    reach[a] = most[a];
+    reach[a + 8] = -least[a];
   }
   return reach;
 }

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "mapcodec/codec/surface_optimizer.hpp"
 
+#include <bit>
+
 #include "mapcodec/codec/surface_prices.hpp"
 #include "mapcodec/codec/surface_voxel_errors.hpp"
 
@@ -32,15 +34,24 @@ struct Planes {
   double own_bits = 0, none_bits = 0;
 };
 
-/// Kinds of leaves that lost many times in a row are tried less often.
-class Luck {
+/// What a voxel of a block costs [bits, its error included], by how many points it holds: learnt from blocks
+/// that were looked at. Most cells cost so much less as leaves or divided that they need no look.
+class UsualBlocks {
  public:
-  bool is_worth_a_try() { return ++losses_ < kPatience || losses_ % kRare == 0; }
-  void won() { losses_ = 0; }
+  [[nodiscard]] double promising(std::uint32_t points, std::uint32_t voxels) const {
+    return kPromising * cost_[kind(points, voxels)] * voxels;
+  }
+  void learn(std::uint32_t points, std::uint32_t voxels, double cost) {
+    double& usual = cost_[kind(points, voxels)];
+    usual += 0.02 * (std::min(cost / voxels, 3 * usual) - usual);
+  }
 
  private:
-  static constexpr std::uint32_t kPatience = 64, kRare = 8;
-  std::uint32_t losses_ = 0;
+  static constexpr double kPromising = 0.5;  // of what is usual: more loses blocks that are worth their bits
+  static unsigned kind(std::uint32_t points, std::uint32_t voxels) {
+    return std::min(static_cast<unsigned>(std::bit_width(points / voxels)) - 1, 3u);
+  }
+  std::array<double, 4> cost_{6, 6, 6, 6};
 };
 
 class Optimizer {
@@ -191,7 +202,11 @@ class Optimizer {
     if (p.inherited != nullptr && forward_ * p.inherited_error < hopeless(cell)) {
       consider_plane(cell, c, p, false, limit, best);
     }
-    if (p.has_own && forward_ * p.own_error < hopeless(cell)) consider_plane(cell, c, p, true, limit, best);
+    if (!p.has_own || forward_ * p.own_error >= hopeless(cell)) return;
+    // Of few points a plane of their own can save little more than their distances to the inherited one.
+    const bool enough = cell.count() <= LeafErrors::kFew && best.error < kNever &&
+                        p.inherited_error - p.own_error < lambda_ * (p.own_bits - p.none_bits);
+    if (p.inherited == nullptr || !enough) consider_plane(cell, c, p, true, limit, best);
   }
 
   void consider_plane(const TreeCell& cell, const CellContext& c, const Planes& p, bool own, double limit,
@@ -319,11 +334,8 @@ class Optimizer {
     const PlaneState state = p.inherited != nullptr ? PlaneState::inherited : PlaneState::none;
     const double flags = p.none_bits + prices_.leaf(cell, c, state, true);
     const double to_beat = std::min(limit, cost_of(best));
-    constexpr double kLeastBits = 0.7;  // a voxel
-    const double least_bits = kLeastBits * voxels_.count_in(cell);
-    if (lambda_ * (flags + least_bits) >= to_beat) return;
-    Luck& luck = blocks_[2 * cell.count() < 3 * voxels_.count_in(cell)];
-    if (!luck.is_worth_a_try()) return;
+    const std::uint32_t voxels = voxels_.count_in(cell);
+    if (lambda_ * (flags + blocks_.promising(cell.count(), voxels)) >= to_beat) return;
     const auto errors = voxels_.errors_in(cell, errors_);
     Candidate r;
     for (std::uint8_t noise = 0; noise <= kMostNoise; ++noise) {
@@ -334,9 +346,8 @@ class Optimizer {
       t.bits = flags + prices_.noise(c, noise, true);
       take_if_better(t, r);
     }
-    if (cost_of(r) + least_bits * lambda_ >= to_beat) return;
     r.bits += walk_block(cell, p.inherited, -1, (to_beat - cost_of(r)) / lambda_);
-    if (cost_of(r) < to_beat) luck.won();
+    blocks_.learn(cell.count(), voxels, cost_of(r) / lambda_);
     take_if_better(r, best);
   }
 
@@ -461,7 +472,7 @@ class Optimizer {
   Prices prices_;
   LeafErrors errors_;
   VoxelErrors voxels_;
-  std::array<Luck, 2> blocks_;  ///< of several points to a voxel, and of about one
+  UsualBlocks blocks_;
   std::vector<Choice> choices_;
   std::vector<std::uint8_t> halves_;  // scratch
 };

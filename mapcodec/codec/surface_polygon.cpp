@@ -219,14 +219,21 @@ constexpr std::array<std::int32_t, 16> kCos{4096,  3784,  2896,  1567,  0, -1567
 }  // namespace
 
 void clip(Polygon& polygon, std::int64_t c, std::int64_t gu, std::int64_t gv) {
+  std::array<std::int64_t, 12> f;
+  bool cuts = false;
+  for (int i = 0; i < polygon.size; ++i) {
+    f[i] = value(c, gu, gv, polygon.at[i]);
+    cuts = cuts || f[i] > 0;
+  }
+  polygon.rectangle = false;
+  if (!cuts) return;
   Polygon r;
   for (int i = 0; i < polygon.size; ++i) {
-    const Vertex& a = polygon.at[i];
-    const Vertex& b = polygon.at[i + 1 == polygon.size ? 0 : i + 1];
-    const std::int64_t fa = value(c, gu, gv, a), fb = value(c, gu, gv, b);
-    if (fa <= 0 && r.size < 12) r.at[static_cast<std::size_t>(r.size++)] = a;
+    const int next = i + 1 == polygon.size ? 0 : i + 1;
+    const std::int64_t fa = f[i], fb = f[next];
+    if (fa <= 0 && r.size < 12) r.at[static_cast<std::size_t>(r.size++)] = polygon.at[i];
     if (((fa < 0 && fb > 0) || (fa > 0 && fb < 0)) && r.size < 12) {
-      r.at[static_cast<std::size_t>(r.size++)] = between(a, b, fa, fb);
+      r.at[static_cast<std::size_t>(r.size++)] = between(polygon.at[i], polygon.at[next], fa, fb);
     }
   }
   polygon = r;
