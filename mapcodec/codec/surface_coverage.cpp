@@ -50,20 +50,26 @@ std::uint64_t touched(std::uint64_t cells, unsigned axis, int to) {
 
 }  // namespace
 
-Coverage::Block& Coverage::Level::slot(std::uint64_t key) {
-  const std::size_t mask = table.size() - 1;
-  std::size_t i = hash_of(key) & mask;
-  while (table[i].key != kFree && table[i].key != key) i = (i + 1) & mask;
-  return table[i];
+void Coverage::Table::reserve(std::size_t blocks) {
+  slots_.assign(std::bit_ceil(blocks + blocks / 4 + 2), Block{});
 }
 
-const Coverage::Block& Coverage::Level::block_at(std::uint64_t key) {
-  if (table[last].key == key) return table[last];
-  const std::size_t mask = table.size() - 1;
+std::size_t Coverage::Table::slot(std::uint64_t key) const {
+  const std::size_t mask = slots_.size() - 1;
   std::size_t i = hash_of(key) & mask;
-  while (table[i].key != kFree && table[i].key != key) i = (i + 1) & mask;
-  last = i;
-  return table[i];
+  while (slots_[i].key != kFree && slots_[i].key != key) i = (i + 1) & mask;
+  return i;
+}
+
+void Coverage::Table::add(std::uint64_t key, std::uint64_t cells) {
+  Block& b = slots_[slot(key)];
+  b.key = key;
+  b.cells |= cells;
+}
+
+std::uint64_t Coverage::Table::cells_at(std::uint64_t key) {
+  if (slots_[last_].key != key) last_ = slot(key);
+  return slots_[last_].cells;
 }
 
 void Coverage::Level::spread(const Block& from) {
@@ -79,10 +85,7 @@ void Coverage::Level::spread(const Block& from) {
       for (int dx = -1; dx <= 1; ++dx) {
         const std::uint64_t in_x = touched(in_y, 0, dx);
         if (in_x == 0 || x + dx < 0) continue;
-        const std::uint64_t to = key_of(x + dx, y + dy, z + dz);
-        Block& b = slot(to);
-        b.key = to;
-        b.near |= in_x;
+        near.add(key_of(x + dx, y + dy, z + dz), in_x);
       }
     }
   }
@@ -103,7 +106,7 @@ void Coverage::Level::build(std::span<const Units> points) {
   for (const Units& p : points) {
     const std::int64_t x = p[0] >> side, y = p[1] >> side, z = p[2] >> side;
     const std::uint64_t key = key_of(x >> 2, y >> 2, z >> 2);
-    if (blocks.empty() || blocks.back().key != key) blocks.push_back({key, 0, 0});
+    if (blocks.empty() || blocks.back().key != key) blocks.push_back({key, 0});
     blocks.back().cells |= std::uint64_t{1} << bit_of(x, y, z);
   }
   std::size_t touching = 0;
@@ -113,11 +116,10 @@ void Coverage::Level::build(std::span<const Units> points) {
       faces *= 1 + ((b.cells & kLowFace[d]) != 0) + ((b.cells & kHighFace[d]) != 0);
     touching += static_cast<std::size_t>(faces);
   }
-  table.assign(std::bit_ceil(touching + touching / 4 + 2), Block{});
+  held.reserve(blocks.size());
+  near.reserve(touching);
   for (const Block& b : blocks) {
-    Block& mine = slot(b.key);
-    mine.key = b.key;
-    mine.cells = b.cells;
+    held.add(b.key, b.cells);
     spread(b);
   }
 }
@@ -126,11 +128,11 @@ Coverage::Coverage(std::span<const Units> points, unsigned depth) : points_(poin
   // The last level is one block, in which any place is near a point or far from all.
   unsigned side = std::min(kFinest, depth);
   while (side + 1 < depth && Level::is_sparse(points, side)) ++side;
-  for (; side <= std::max(depth, kFinest); ++side) levels_.push_back({side, {}, 0});
+  for (; side <= std::max(depth, kFinest); ++side) levels_.push_back({side, {}, {}});
 }
 
 Coverage::Level& Coverage::level(std::size_t l) {
-  if (levels_[l].table.empty()) levels_[l].build(points_);
+  if (levels_[l].held.empty()) levels_[l].build(points_);
   return levels_[l];
 }
 
@@ -142,7 +144,7 @@ std::size_t Coverage::first_level(double covered) const {
 
 bool Coverage::is_near(Level& level, const Cell& p) {
   const std::int64_t x = p[0] >> level.side, y = p[1] >> level.side, z = p[2] >> level.side;
-  return ((level.block_at(key_of(x >> 2, y >> 2, z >> 2)).near >> bit_of(x, y, z)) & 1) != 0;
+  return ((level.near.cells_at(key_of(x >> 2, y >> 2, z >> 2)) >> bit_of(x, y, z)) & 1) != 0;
 }
 
 /// Squared distance to the middle of the nearest of the eight cells around the corner of the cell grid that
@@ -157,7 +159,7 @@ double Coverage::nearest_of_eight(Level& level, const Cell& p) {
     for (std::int64_t y = low[1] >> 2; y <= (low[1] + 1) >> 2; ++y) {
       for (std::int64_t x = low[0] >> 2; x <= (low[0] + 1) >> 2; ++x) {
         if (x < 0 || y < 0 || z < 0) continue;
-        std::uint64_t cells = level.block_at(key_of(x, y, z)).cells & two_of(0, low[0] - 4 * x) &
+        std::uint64_t cells = level.held.cells_at(key_of(x, y, z)) & two_of(0, low[0] - 4 * x) &
                               two_of(1, low[1] - 4 * y) & two_of(2, low[2] - 4 * z);
         for (; cells != 0; cells &= cells - 1) {
           const std::int64_t bit = std::countr_zero(cells);

@@ -32,21 +32,31 @@ class Coverage {
   /// Four cells a side, one bit each.
   struct Block {
     std::uint64_t key = kFree;
-    std::uint64_t cells = 0;  ///< that hold points
-    std::uint64_t near = 0;   ///< that do, or touch one that does
+    std::uint64_t cells = 0;
+  };
+  /// Blocks by their keys.
+  class Table {
+   public:
+    void reserve(std::size_t blocks);
+    [[nodiscard]] bool empty() const { return slots_.empty(); }
+    void add(std::uint64_t key, std::uint64_t cells);
+    [[nodiscard]] std::uint64_t cells_at(std::uint64_t key);
+
+   private:
+    [[nodiscard]] std::size_t slot(std::uint64_t key) const;
+    std::vector<Block> slots_;
+    std::size_t last_ = 0;  ///< where the last answer was found: the next is often the same
   };
   struct Level {
     unsigned side = 0;  ///< of a cell, log2 [units]
-    std::vector<Block> table;
-    std::size_t last = 0;  ///< where the last answer was found: the next is often the same
+    Table held;         ///< cells that hold points
+    Table near;         ///< that do, or touch one that does
     void build(std::span<const Units> points);
     /// Points to a block of cells, on average.
     [[nodiscard]] static bool is_sparse(std::span<const Units> points, unsigned side);
-    [[nodiscard]] const Block& block_at(std::uint64_t key);
 
    private:
     void spread(const Block& from);
-    Block& slot(std::uint64_t key);
   };
 
   [[nodiscard]] std::size_t first_level(double covered) const;

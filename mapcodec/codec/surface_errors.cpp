@@ -156,11 +156,10 @@ LeafError LeafErrors::at_center(const TreeCell& cell, const Moments& m) const {
   return e;
 }
 
-double LeafErrors::of_single(const TreeCell& cell, const Plane* plane) {
+double LeafErrors::of_single(const TreeCell& cell, const Plane* plane, const Polygon& polygon) {
   const Units c = cell.twice_center();
   Place at{0.5 * c[0], 0.5 * c[1], 0.5 * c[2]};
   if (plane != nullptr) {
-    const Polygon polygon = polygon_of(*plane, cell.shape, Room::in(outline_, cell.at, cell.shape));
     if (polygon.rectangle && polygon.at[2].u == kHalf && polygon.at[2].v == kHalf) {
       at[plane->axis] += double(plane->h) / (1 << kHeightBits);
     } else if (polygon.size >= 3) {

@@ -23,16 +23,16 @@ class LeafErrors {
   static constexpr std::uint32_t kFew = 16;
   static constexpr std::uint32_t kFewProbes = 16, kManyProbes = 64;
 
-  LeafErrors(std::span<const Units> points, unsigned depth, const Outline& outline)
-      : points_(points), outline_(outline), moments_(points), coverage_(points, depth) {}
+  LeafErrors(std::span<const Units> points, unsigned depth)
+      : points_(points), moments_(points), coverage_(points, depth) {}
 
   [[nodiscard]] Moments moments(const TreeCell& cell) const {
     return moments_.about(cell.begin, cell.end, cell.twice_center());
   }
   /// All points at the cell's centre.
   [[nodiscard]] LeafError at_center(const TreeCell& cell, const Moments& m) const;
-  /// One point, on the plane if there is one [units^2].
-  [[nodiscard]] double of_single(const TreeCell& cell, const Plane* plane);
+  /// One point, on the plane if there is one [units^2]. @param polygon  of the plane.
+  [[nodiscard]] double of_single(const TreeCell& cell, const Plane* plane, const Polygon& polygon);
   /// Spreads the points of a cell of at most kFew over its polygon, for of_few().
   void decode_few(const TreeCell& cell, const Plane& plane, const Polygon& polygon);
   /// The cell last given to decode_few(), with its plane.
@@ -61,7 +61,6 @@ class LeafErrors {
   static double squared(const Place& a, const Units& b);
 
   std::span<const Units> points_;
-  Outline outline_;
   MomentTable moments_;
   Coverage coverage_;
   static constexpr float kFarPlace = 1e12F;

@@ -32,6 +32,7 @@ struct Planes {
   bool has_own = false;
   double inherited_error = kNever, own_error = kNever;
   double own_bits = 0, none_bits = 0;
+  Polygon inherited_polygon, own_polygon;  ///< empty without the plane
 };
 
 /// What a voxel of a block costs [bits, its error included], by how many points it holds: learnt from blocks
@@ -39,7 +40,8 @@ struct Planes {
 class UsualBlocks {
  public:
   [[nodiscard]] double promising(std::uint32_t points, std::uint32_t voxels) const {
-    return kPromising * cost_[kind(points, voxels)] * voxels;
+    const unsigned k = kind(points, voxels);
+    return (k == 0 ? kPromisingOfSingles : kPromising) * cost_[k] * voxels;
   }
   void learn(std::uint32_t points, std::uint32_t voxels, double cost) {
     double& usual = cost_[kind(points, voxels)];
@@ -47,7 +49,8 @@ class UsualBlocks {
   }
 
  private:
-  static constexpr double kPromising = 0.5;  // of what is usual: more loses blocks that are worth their bits
+  // Of what is usual: more loses blocks that are worth their bits, of which voxels of single points are few.
+  static constexpr double kPromising = 0.5, kPromisingOfSingles = 0.75;
   static unsigned kind(std::uint32_t points, std::uint32_t voxels) {
     return std::min(static_cast<unsigned>(std::bit_width(points / voxels)) - 1, 3u);
   }
@@ -62,7 +65,7 @@ class Optimizer {
         forward_(trade.forward_weight),
         lambda_(trade.bit_price * kStep2),
         prices_(models),
-        errors_(points, depth, models.outline) {
+        errors_(points, depth) {
     if (models.voxel_bits > 0) voxels_ = VoxelErrors(points, models.voxel_bits, forward_, lambda_);
   }
 
@@ -132,7 +135,10 @@ class Optimizer {
                      const Plane* inherited) const {
     Planes r;
     r.inherited = inherited;
-    if (inherited != nullptr) r.inherited_error = squared_distances(m, cell.shape, *inherited);
+    if (inherited != nullptr) {
+      r.inherited_error = squared_distances(m, cell.shape, *inherited);
+      r.inherited_polygon = polygon_of(*inherited, cell.shape, prices_.room(cell));
+    }
     r.has_own =
         cell.count() >= 3 && fit_plane(m, cell.shape, inherited != nullptr ? inherited->axis : 3, r.own);
     if (!r.has_own) return r;
@@ -140,6 +146,7 @@ class Optimizer {
     r.own_bits = prices_.plane(c, r.own, inherited, cell.shape);
     r.none_bits = prices_.no_plane(c, inherited != nullptr);
     if (r.own_error < hopeless(cell)) cheapen(cell, c, m, r);
+    r.own_polygon = polygon_of(r.own, cell.shape, prices_.room(cell));
     return r;
   }
 
@@ -189,7 +196,7 @@ class Optimizer {
   void consider_center(const TreeCell& cell, const Moments& m, const CellContext& c, const Planes& p,
                        Candidate& best) const {
     const bool inherits = p.inherited != nullptr;
-    if (inherits && polygon_of(*p.inherited, cell.shape, prices_.room(cell)).size >= 3) return;
+    if (p.inherited_polygon.size >= 3) return;
     Candidate r;
     set_error(r, errors_.at_center(cell, m));
     r.bits = p.none_bits + prices_.leaf(cell, c, inherits ? PlaneState::inherited : PlaneState::none);
@@ -218,7 +225,7 @@ class Optimizer {
     r.bits = (own ? p.own_bits : p.none_bits) +
              prices_.leaf(cell, c, own ? PlaneState::own : PlaneState::inherited);
     if (0.25 * mix(beside, 0) + lambda_ * r.bits >= std::min(limit, cost_of(best))) return;
-    const Polygon polygon = polygon_of(plane, cell.shape, prices_.room(cell));
+    const Polygon& polygon = own ? p.own_polygon : p.inherited_polygon;
     if (polygon.size < 3) return;
     if (cell.count() <= LeafErrors::kFew) {
       consider_few(cell, c, plane, polygon, beside, r, best);
@@ -415,9 +422,10 @@ class Optimizer {
         sets ? PlaneState::own : (pass != nullptr ? PlaneState::inherited : PlaneState::none);
     const std::size_t split = cell.first_above(points_);
     const int halves = halves_of(cell, split);
-    double cost = lambda_ * ((sets ? p.own_bits : p.none_bits) +
-                             prices_.division(cell, c, state, pass, halves,
-                                              static_cast<std::uint32_t>(split - cell.begin)));
+    double cost =
+        lambda_ * ((sets ? p.own_bits : p.none_bits) +
+                   prices_.division(cell, c, state, pass, sets ? p.own_polygon : p.inherited_polygon, halves,
+                                    static_cast<std::uint32_t>(split - cell.begin)));
     for (unsigned h = 0; h < 2; ++h) {
       if (halves == static_cast<int>(2 - h)) continue;
       if (cost >= limit) return kNever;
@@ -440,7 +448,9 @@ class Optimizer {
     halves_.clear();
     for (;;) {
       const CellContext c = Prices::context(cell);
-      const double error = errors_.of_single(cell, here);
+      Polygon polygon;
+      if (here != nullptr) polygon = polygon_of(plane, cell.shape, prices_.room(cell));
+      const double error = errors_.of_single(cell, here, polygon);
       const double cost = error + lambda_ * (spent + prices_.leaf(cell, c, state));
       if (cost < least) {
         least = cost;
@@ -449,7 +459,7 @@ class Optimizer {
       if (error <= lambda_ * kEnoughBitsOfFew || cell.level >= 3 * depth_) break;
       const unsigned axis = cell.axis();
       const bool upper = static_cast<std::uint32_t>(points_[cell.begin][axis]) >= cell.border();
-      spent += prices_.division(cell, c, state, here, upper ? 2 : 1, 0);
+      spent += prices_.division(cell, c, state, here, polygon, upper ? 2 : 1, 0);
       halves_.push_back(upper);
       if (lambda_ * spent >= least) break;
       if (here != nullptr) plane = in_child(plane, axis, upper, cell.shape[axis]);

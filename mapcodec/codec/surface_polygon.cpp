@@ -286,7 +286,12 @@ std::int64_t twice_area(const Polygon& p) {
 }
 
 int lower_share(const Plane& plane, const CellShape& shape, const Room& room, unsigned split_axis) {
-  Polygon p = polygon_of(plane, shape, room);
+  return lower_share(polygon_of(plane, shape, room), plane, shape, room, split_axis);
+}
+
+int lower_share(const Polygon& polygon, const Plane& plane, const CellShape& shape, const Room& room,
+                unsigned split_axis) {
+  Polygon p = polygon;
   const std::int64_t all = twice_area(p);
   if (p.size < 3 || all < 256) return -1;
   if (split_axis == plane.axis) {

@@ -44,6 +44,9 @@ void cut(Polygon& polygon, const Wedge& wedge);
 /// Share (0..256) of the plane's polygon in the lower half of the cell along `split_axis`.
 [[nodiscard]] int lower_share(const Plane& plane, const CellShape& shape, const Room& room,
                               unsigned split_axis);
+/// The same, if the polygon is known.
+[[nodiscard]] int lower_share(const Polygon& polygon, const Plane& plane, const CellShape& shape,
+                              const Room& room, unsigned split_axis);
 
 /// By how much the density of points changes from a cell's middle to its upper faces, in 1/256.
 struct Tilt {

@@ -40,10 +40,10 @@ double Prices::noise(const CellContext& c, std::uint8_t v, bool voxels) const {
 }
 
 double Prices::division(const TreeCell& cell, const CellContext& c, PlaneState state, const Plane* plane,
-                        int halves, std::uint32_t lower) const {
+                        const Polygon& polygon, int halves, std::uint32_t lower) const {
   CostMeter meter;
   models_.divided(meter, true, c, static_cast<int>(state));
-  const int share = plane != nullptr ? lower_share(*plane, cell.shape, room(cell), cell.axis()) : -1;
+  const int share = plane != nullptr ? lower_share(polygon, *plane, cell.shape, room(cell), cell.axis()) : -1;
   models_.halves(meter, halves, cell.count(), c, share);
   if (halves == 0) models_.lower_count(meter, lower, cell.count(), share);
   return meter.bits();

@@ -43,9 +43,11 @@ class Prices {
                             bool block = false) const;
   [[nodiscard]] double wedge(const CellContext& c, const Wedge* line) const;
   [[nodiscard]] double noise(const CellContext& c, std::uint8_t v, bool voxels) const;
-  /// Of dividing a cell: the flag, which halves hold points, and how many.
+  /// Of dividing a cell: the flag, which halves hold points, and how many. @param polygon  of the plane,
+  /// where there is one.
   [[nodiscard]] double division(const TreeCell& cell, const CellContext& c, PlaneState state,
-                                const Plane* plane, int halves, std::uint32_t lower) const;
+                                const Plane* plane, const Polygon& polygon, int halves,
+                                std::uint32_t lower) const;
   /// Of one division inside a block.
   [[nodiscard]] double block_division(const TreeCell& cell, const Plane* plane, int halves) const;
 
