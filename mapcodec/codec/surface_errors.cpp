@@ -6,7 +6,10 @@
 namespace mapcodec::surface {
 namespace {
 
-constexpr double kCoveredSteps2 = 0.15;  // a place so near to a point [steps^2] is covered
+constexpr double kCoveredSteps2 = 0.4;  // a place so near to a point [steps^2] is covered
+// Mean squared distance, in shares of the area that one point has, of any place on a plane to the nearest of
+// points on a square lattice, as decoded ones are, and of points at random, as originals are.
+constexpr double kToLattice = 1.0 / 6, kToRandom = 0.3183;
 constexpr double kFilled = 0.32;  // mean squared distance of points in a volume, each alone in a share of 1
 
 double cosine(unsigned sixteenth) {
@@ -206,16 +209,15 @@ LeafError LeafErrors::of_few(const TreeCell& cell, const Plane& plane, std::uint
 
 LeafError LeafErrors::of_many(const TreeCell& cell, const Plane& plane, const Polygon& polygon, double beside,
                               double missed, std::uint8_t noise, double roughness, double lambda) const {
-  // n points, each alone in its share of the area, about a square: the mean squared distance in it is a
-  // sixth.
   const double area = area_of(cell.shape, plane, polygon);
-  const double in_plane = area / 6;
   double forth = beside, back = kBackShare * beside;
   if (noise != 0) thicken(cell.count(), area, beside, noise, roughness, forth, back);
   // Dividing lowers what lies beside the surface and what is missed; the positions on it only where they are
   // worth bits.
+  const double in_plane = kToLattice * area, back_in_plane = kToRandom * area;
   const double on_it = std::max(0.0, in_plane - 0.5 * lambda * cell.count());
-  return {forth + in_plane, in_plane + missed + back, forth + on_it, missed + back + on_it};
+  return {forth + in_plane, back_in_plane + missed + back, forth + on_it,
+          missed + back + kToRandom / kToLattice * on_it};
 }
 
 double LeafErrors::missed(const TreeCell& cell, const Plane& plane, const Polygon& polygon,

@@ -78,7 +78,7 @@ void thicken(double n, double area, double beside, std::uint8_t noise, double ro
              double& back);
 
 /// Of the squared distances to a plane, what the nearest originals keep.
-inline constexpr double kBackShare = 0.5;
+inline constexpr double kBackShare = 0.3;
 
 /// Area of a polygon on its plane [units^2].
 [[nodiscard]] double area_of(const CellShape& shape, const Plane& plane, const Polygon& polygon);

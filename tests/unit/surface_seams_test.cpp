@@ -39,9 +39,12 @@ TEST(SurfaceSeams, NoPointOfASurfaceIsFarFromTheDecodedOne) {
 
 TEST(SurfaceSeams, DensityFollowsTheLeavesBeside) {
   const Cloud cloud = floor(0, 3, 60000, 2);
-  const auto e = encode_surface(cloud, steps_of(0.04), {});
-  ASSERT_TRUE(e.ok());
-  EXPECT_LT(density_error(cloud, e->decoded), 0.25);
+  // The surface takes fewer than a hundred bytes: coarser steps have too few leaves to follow.
+  for (const double step : {0.03, 0.036}) {
+    const auto e = encode_surface(cloud, steps_of(step), {});
+    ASSERT_TRUE(e.ok());
+    EXPECT_LT(density_error(cloud, e->decoded), 0.22) << step;
+  }
 }
 
 TEST(SurfaceSeams, TilesOverlapWhereTheSurfaceGoesOn) {
