@@ -213,6 +213,10 @@ Result<std::optional<std::vector<TileTry>>> MixtureSearch::run(TileSettings surf
   return settled;
 }
 
+double cost_of(std::span<const TileTry> tiles) {
+  return sum_of(tiles).bits;
+}
+
 Result<std::optional<std::vector<TileTry>>> search_mixture(std::size_t tiles, double rms_m,
                                                            const CodeTiles& code,
                                                            const TileSettings& surfaces, bool with_points,
@@ -225,7 +229,7 @@ Result<std::optional<std::vector<TileTry>>> search_mixture(std::size_t tiles, do
   double& weight = other.trade.forward_weight;
   weight = std::min(balance < 1 ? weight * kOtherWeight : weight / kOtherWeight, 1.0);
   MAPCODEC_ASSIGN(auto second, MixtureSearch(tiles, rms_m, code, most_rms_m).run(other, with_points));
-  if (second && sum_of(*second).bits < sum_of(*best).bits) return second;
+  if (second && cost_of(*second) < cost_of(*best)) return second;
   return best;
 }
 

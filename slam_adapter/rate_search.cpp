@@ -164,10 +164,16 @@ Result<std::optional<std::vector<TileTry>>> RateSearch::for_each_tile(CodingPlan
   };
   TileSettings surfaces = plan.tiles;
   surfaces.step_m = plan.step_m;
-  MAPCODEC_ASSIGN(auto settled, search_mixture(sample_.pieces.size(), rms_m, code, surfaces, with_points));
+  const std::size_t tiles = sample_.pieces.size();
+  MAPCODEC_ASSIGN(auto settled, search_mixture(tiles, rms_m, code, surfaces, with_points));
   plan.choice = CodecChoice::cheapest;
   const auto is_surface = [](const TileTry& t) { return t.settings.codec == CodecId::surface; };
   if (settled && std::none_of(settled->begin(), settled->end(), is_surface)) settled.reset();
+  // The search of surfaces alone goes by other steps and weights, and may find a little more.
+  if (settled && with_points && surfaces.effort != Effort::fast) {
+    MAPCODEC_ASSIGN(auto alone, search_mixture(tiles, rms_m, code, surfaces, false));
+    if (alone && cost_of(*alone) < cost_of(*settled)) return alone;
+  }
   return settled;
 }
 
