@@ -23,9 +23,8 @@ constexpr double kPaperTilePoints = 1000000;
 constexpr double kSurfaceBits = 3;
 
 // Where positions take less than this share of the bytes, finer ones can save more of the colours than they
-// cost: so much finer they are tried, taken where the map is clearly smaller, and tried again where it is
-// much smaller.
-constexpr double kFewForPositions = 0.1, kFiner = 0.55, kClearlySmaller = 0.95, kMuchSmaller = 0.85;
+// cost: so much finer they are tried, and taken as long as the map is clearly smaller.
+constexpr double kFewForPositions = 0.1, kFiner = 0.55, kClearlySmaller = 0.98;
 
 std::string folder_of(const std::string& path) {
   const auto parent = std::filesystem::path(path).parent_path();
@@ -51,7 +50,7 @@ Result<CompressReport> CompressJob::run() {
   for (bool again = true; again && colors_dominate();) {
     const double bits = coding_->coded().bits_per_point();
     MAPCODEC_TRY(try_finer());
-    again = coding_->coded().bits_per_point() < kMuchSmaller * bits;
+    again = coding_->coded().bits_per_point() < bits;
   }
   take_report();
   watch.lap();
