@@ -13,9 +13,10 @@ constexpr double kLeastRms = 0.95, kRmsAim = 0.992;
 constexpr double kNearRms = 0.98;
 constexpr int kTriesForNear = 3;
 
-// Of the map's colour, in shares of its bound: where it shall lie, what is near enough, and the range of
-// slopes.
-constexpr double kColorAim = 0.985, kNearColor = 0.96, kFirstSlope = 25, kLeastSlope = 0.1, kMostSlope = 4000;
+// Of the map's colour, in shares of its bound: where it shall lie, what is near enough (bits fall with about
+// the fifth power of the error), and the range of slopes.
+constexpr double kColorAim = 0.993, kNearColor = 0.985, kFirstSlope = 25, kLeastSlope = 0.1,
+                 kMostSlope = 4000;
 // How the error grows with the slope, and how far one guess may go.
 constexpr double kColorExponent = 0.22, kColorLeap = 2;
 // What nobody asked for shall not come nearer than this to the least error that positions allow.

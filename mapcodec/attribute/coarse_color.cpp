@@ -12,12 +12,13 @@
 namespace mapcodec {
 namespace {
 
-using Symbols = std::array<std::int64_t, 3>;
-
 constexpr std::int64_t kMostSymbol = 0xffffff;
 constexpr double kLevel = 1 << kColorFraction;
 /// Squared lengths of R + G + B, R - B, R - 2 G + B.
 constexpr std::array<double, 3> kLength2{3, 2, 6};
+/// Added to squared deviations [steps^2] where the best trust is sought: large ones cost bits by their
+/// logarithm, so they count little more than small ones.
+constexpr double kUsualDeviation2 = 0.1;
 
 /// Sums of aims and weights over any run of points.
 class AimSums {
@@ -51,7 +52,13 @@ class WeighingPolicy {
  public:
   static constexpr bool kKnows = true;
   WeighingPolicy(const ColorTree& tree, const AimSums& aims, double price)
-      : tree_(tree), aims_(aims), price_(price), models_(std::make_unique<ColorModels>()) {}
+      : tree_(tree),
+        aims_(aims),
+        price_(price),
+        models_(std::make_unique<CoarseColorModels>()),
+        begins_run_(tree.points() + 1) {
+    begins_run_.front() = begins_run_.back() = true;
+  }
 
   void enter(std::size_t level) {
     level_ = &tree_.levels()[level];
@@ -68,33 +75,58 @@ class WeighingPolicy {
   void enter_split(std::uint32_t begin, std::uint32_t middle, std::uint32_t end) {
     // The first part moves by the share of the second, and the other way round.
     const double share = double(end - middle) / double(end - begin);
+    ends_ = {begin, middle, end};
     curvature_ =
         aims_.weight(begin, middle) * share * share + aims_.weight(middle, end) * (1 - share) * (1 - share);
   }
   [[nodiscard]] bool ok() const { return true; }
 
-  Symbols code(const SplitContext& context, const ColorPoint& wanted, const ColorPoint& steps) {
-    const Symbols q = choose(context, wanted, steps);
-    if (q != Symbols{}) deepest_ = depth_;
+  ColorSymbols code(const SplitContext& context, const ColorPoint& wanted, const ColorPoint& steps) {
+    const ColorSymbols q = choose(context, wanted, steps);
+    if (q != ColorSymbols{}) {
+      deepest_ = depth_;
+      for (const std::uint32_t e : ends_) begins_run_[e] = true;
+    }
+    learn_trust(context, wanted);
     return code_split(side_, *models_, context, q);
   }
   /// Levels whose splits need coding.
   [[nodiscard]] std::uint32_t deepest() const { return deepest_; }
   [[nodiscard]] Bytes finish() { return side_.finish(); }
+  [[nodiscard]] std::vector<std::uint32_t> runs() const {
+    std::vector<std::uint32_t> r;
+    for (std::uint32_t i = 0; i < begins_run_.size(); ++i) {
+      if (begins_run_[i]) r.push_back(i);
+    }
+    return r;
+  }
+  /// By how much predicted differences should have been multiplied.
+  [[nodiscard]] double trust() const { return square_ > 0 ? product_ / square_ : 1; }
 
  private:
-  Symbols choose(const SplitContext& context, const ColorPoint& wanted, const ColorPoint& steps) {
-    Symbols nearest{};
+  /// Least squares of the true differences by the predicted ones, each weighed by what it costs in bits.
+  void learn_trust(const SplitContext& context, const ColorPoint& wanted) {
+    for (std::size_t c = 0; c < 3; ++c) {
+      const double predicted = static_cast<double>(context.predicted[c]);
+      const double off = static_cast<double>(wanted[c]);
+      const double weight = curvature_ / kLength2[c] / (kUsualDeviation2 + at_[c] * at_[c]);
+      product_ += weight * predicted * (predicted + off);
+      square_ += weight * predicted * predicted;
+    }
+  }
+
+  ColorSymbols choose(const SplitContext& context, const ColorPoint& wanted, const ColorPoint& steps) {
+    ColorSymbols nearest{};
     for (std::size_t c = 0; c < 3; ++c) {
       const double step = static_cast<double>(steps[c]);
       at_[c] = static_cast<double>(wanted[c]) / step;
       weight_[c] = curvature_ * (step / kLevel) * (step / kLevel) / kLength2[c];
       nearest[c] = std::clamp<std::int64_t>(std::llround(at_[c]), -kMostSymbol, kMostSymbol);
     }
-    if (nearest == Symbols{}) return nearest;
-    Symbols best{};
+    if (nearest == ColorSymbols{}) return nearest;
+    ColorSymbols best{};
     double least = cost(context, best);
-    const auto consider = [&](const Symbols& q) {
+    const auto consider = [&](const ColorSymbols& q) {
       const double c = cost(context, q);
       if (c < least) {
         least = c;
@@ -104,7 +136,7 @@ class WeighingPolicy {
     };
     descend(nearest, consider);
     for (std::size_t c = 0; c < 3; ++c) {
-      Symbols alone{};
+      ColorSymbols alone{};
       alone[c] = nearest[c];
       if (nearest[c] != 0 && alone != nearest) consider(alone);
     }
@@ -113,13 +145,13 @@ class WeighingPolicy {
 
   /// From the nearest symbols towards zero, one component at a time, while that is cheaper.
   template <class Consider>
-  static void descend(Symbols q, Consider&& consider) {
+  static void descend(ColorSymbols q, Consider&& consider) {
     double here = consider(q);
     for (bool moved = true; moved;) {
       moved = false;
       for (std::size_t c = 0; c < 3; ++c) {
         if (q[c] == 0) continue;
-        Symbols next = q;
+        ColorSymbols next = q;
         next[c] += q[c] > 0 ? -1 : 1;
         const double there = consider(next);
         if (there >= here) continue;
@@ -130,7 +162,7 @@ class WeighingPolicy {
     }
   }
 
-  [[nodiscard]] double cost(const SplitContext& context, const Symbols& q) {
+  [[nodiscard]] double cost(const SplitContext& context, const ColorSymbols& q) {
     CostMeter meter;
     code_split(meter, *models_, context, q);
     double sum = price_ * meter.bits();
@@ -145,7 +177,10 @@ class WeighingPolicy {
   const AimSums& aims_;
   double price_;
   SymbolWriter side_;
-  std::unique_ptr<ColorModels> models_;
+  std::unique_ptr<CoarseColorModels> models_;
+  std::vector<bool> begins_run_;
+  std::array<std::uint32_t, 3> ends_{};  ///< of the split's points
+  double product_ = 0, square_ = 0;
   const ColorLevel* level_ = nullptr;
   std::uint32_t depth_ = 0, deepest_ = 0;
   double curvature_ = 0;
@@ -160,13 +195,13 @@ struct CoarseColorEncoder::State {
   ColorTree tree;
 
   State(std::span<const VoxelCoord> voxels, const ChannelInfo& channel, ColorScale scale)
-      : info(channel), tree(voxels) {
+      : info(channel), tree(voxels, true) {
     settings.scale = scale;
     settings.coarse = true;
   }
 
   /// @return the levels that have symbols.
-  std::uint32_t code(const AimSums& aims, double price, std::uint32_t levels, ChannelEncoding& e) {
+  std::uint32_t code(const AimSums& aims, double price, std::uint32_t levels, CoarseColors& e) {
     settings.levels = levels;
     WeighingPolicy policy(tree, aims, price);
     ColorWalk<WeighingPolicy> walk(tree, settings, policy);
@@ -186,6 +221,9 @@ struct CoarseColorEncoder::State {
     write_color_head(out, settings, head);
     out.raw(policy.finish());
     e.bytes = out.take();
+    e.runs = policy.runs();
+    e.trust = static_cast<std::uint8_t>(
+        std::clamp(std::lround(policy.trust() * settings.trust), 1L, long{kMostTrust}));
     return policy.deepest();
   }
 };
@@ -196,10 +234,12 @@ CoarseColorEncoder::CoarseColorEncoder(std::span<const VoxelCoord> voxels, const
 
 CoarseColorEncoder::~CoarseColorEncoder() = default;
 
-ChannelEncoding CoarseColorEncoder::encode(const ColorAims& aims, std::uint32_t step, double price) {
-  ChannelEncoding e;
+CoarseColors CoarseColorEncoder::encode(const ColorAims& aims, std::uint32_t step, double price,
+                                        std::uint8_t trust) {
+  CoarseColors e;
   const AimSums sums(aims);
   state_->settings.step = step;
+  state_->settings.trust = trust;
   const auto levels = static_cast<std::uint32_t>(state_->tree.levels().size());
   const std::uint32_t needed = state_->code(sums, price, levels, e);
   // Levels without symbols are told in the head, not one split at a time.

@@ -19,6 +19,15 @@ struct ColorAims {
   std::vector<float> weights;             ///< of the squared distance to it; >= 0
 };
 
+/// One coding, and what it says of the next one.
+struct CoarseColors {
+  Bytes bytes;      ///< a colour section
+  Channel decoded;  ///< in the order of the voxels
+  /// First points of runs without symbols inside, and the end of all: only the means of these are coded.
+  std::vector<std::uint32_t> runs;
+  std::uint8_t trust = 0;  ///< in predicted differences, 1/16: what would have been best
+};
+
 /// Codes one cloud several times. Threads: one at a time.
 class CoarseColorEncoder {
  public:
@@ -28,8 +37,10 @@ class CoarseColorEncoder {
   ~CoarseColorEncoder();
   /// Least sum over the points of weight * distance^2 + `price` * bits, about.
   /// @param aims   one for each voxel, in their order. @param step  of orthonormal coefficients, 1/16 of an
-  /// 8-bit level, 1..2^24 - 1. @return bytes and what they decode to; `error` is left 0.
-  [[nodiscard]] ChannelEncoding encode(const ColorAims& aims, std::uint32_t step, double price);
+  /// 8-bit level, 1..2^24 - 1. @param trust  in predicted differences, 1/16, at most kMostTrust.
+  [[nodiscard]] CoarseColors encode(const ColorAims& aims, std::uint32_t step, double price,
+                                    std::uint8_t trust);
+  static constexpr std::uint8_t kUsualTrust = 12;
 
  private:
   struct State;

@@ -11,18 +11,19 @@
 namespace mapcodec {
 namespace {
 
+template <class Models>
 class ReadPolicy {
  public:
   static constexpr bool kKnows = false;
-  explicit ReadPolicy(ByteSpan bytes) : side_(bytes), models_(std::make_unique<ColorModels>()) {}
-  std::array<std::int64_t, 3> code(const SplitContext& context, const ColorPoint&, const ColorPoint&) {
+  explicit ReadPolicy(ByteSpan bytes) : side_(bytes), models_(std::make_unique<Models>()) {}
+  ColorSymbols code(const SplitContext& context, const ColorPoint&, const ColorPoint&) {
     return code_split(side_, *models_, context, {});
   }
   [[nodiscard]] bool ok() const { return side_.ok(); }
 
  private:
   SymbolReader side_;
-  std::unique_ptr<ColorModels> models_;
+  std::unique_ptr<Models> models_;
 };
 
 struct Head {
@@ -36,13 +37,19 @@ Result<Head> read_head(ByteReader& in, const ChannelInfo& info) {
   const std::uint64_t step = in.varint();
   const std::uint8_t levels = in.u8();
   for (std::int64_t& c : h.root) c = in.signed_varint();
+  h.settings.coarse = (flags & 8) != 0;
+  if (h.settings.coarse) h.settings.trust = in.u8();
   MAPCODEC_TRY(in.status("colour"));
   h.settings.split_cells = (flags & 1) != 0;
   h.settings.scale = (flags & 2) != 0 ? ColorScale::sixteen : ColorScale::eight;
-  h.settings.coarse = (flags & 4) != 0;
   const bool bad_scale = (flags & 2) != 0 && info.scalar == ScalarType::u8;
   const bool bad_coarse = h.settings.coarse && h.settings.split_cells;
-  if (flags > 7 || bad_scale || bad_coarse || step == 0 || step >= (1u << 24)) {
+  if ((flags & 4) != 0) {
+    return make_error(ErrorCode::kUnsupported, "colours in an earlier coarse form: compress the map again",
+                      in.offset());
+  }
+  if (flags > 11 || bad_scale || bad_coarse || h.settings.trust > kMostTrust || step == 0 ||
+      step >= (1u << 24)) {
     return make_error(ErrorCode::kMalformed, "broken colour head", in.offset());
   }
   h.settings.step = static_cast<std::uint32_t>(step);
@@ -55,26 +62,13 @@ Result<Head> read_head(ByteReader& in, const ChannelInfo& info) {
   return h;
 }
 
-}  // namespace
-
-Result<Channel> decode_color(ByteSpan bytes, const ChannelInfo& info, std::span<const VoxelCoord> voxels,
-                             const DecodeLimits& limits) {
-  // Keys, cells and means by the point, then the levels.
-  const std::uint64_t needed =
-      128 * std::uint64_t{voxels.size()} + sizeof(ColorNode) * ColorTree::count_nodes(voxels);
-  if (voxels.size() > limits.max_points || needed > limits.max_bytes) {
-    return make_error(ErrorCode::kLimitExceeded, "colour would need too much memory");
-  }
-  Channel channel{info, Bytes(voxels.size() * info.stride())};
-  if (voxels.empty()) return channel;
-  ByteReader in(bytes);
-  MAPCODEC_ASSIGN(const Head head, read_head(in, info));
-  const std::size_t at = in.offset();
-  ReadPolicy policy(in.raw(in.left()));
-  const ColorTree tree(voxels);
-  ColorWalk<ReadPolicy> walk(tree, head.settings, policy);
+/// False if the symbols end too early.
+template <class Models>
+bool read_colors(ByteSpan symbols, const ColorTree& tree, const Head& head, Channel& channel) {
+  ReadPolicy<Models> policy(symbols);
+  ColorWalk<ReadPolicy<Models>> walk(tree, head.settings, policy);
   const std::vector<ColorPoint> means = walk.run(head.root);
-  if (!policy.ok()) return make_error(ErrorCode::kTruncated, "colours end too early", at);
+  if (!policy.ok()) return false;
   const ColorLevel& finest = tree.levels().back();
   const auto store = [&](std::uint32_t i, const ColorPoint& p) {
     store_rgb(channel, i, p, head.settings.scale);
@@ -87,7 +81,30 @@ Result<Channel> decode_color(ByteSpan bytes, const ChannelInfo& info, std::span<
       for (std::uint32_t i = begin; i < end; ++i) store(i, means[n]);
     }
   }
-  if (!policy.ok()) return make_error(ErrorCode::kTruncated, "colours end too early", at);
+  return policy.ok();
+}
+
+}  // namespace
+
+Result<Channel> decode_color(ByteSpan bytes, const ChannelInfo& info, std::span<const VoxelCoord> voxels,
+                             const DecodeLimits& limits) {
+  if (voxels.empty()) return Channel{info, {}};
+  ByteReader in(bytes);
+  MAPCODEC_ASSIGN(const Head head, read_head(in, info));
+  // Keys, cells and means by the point, then the levels.
+  const std::uint64_t node_bytes = sizeof(ColorNode) + (head.settings.coarse ? sizeof(EdgeNodes) : 0);
+  const std::uint64_t needed =
+      128 * std::uint64_t{voxels.size()} + node_bytes * ColorTree::count_nodes(voxels);
+  if (voxels.size() > limits.max_points || needed > limits.max_bytes) {
+    return make_error(ErrorCode::kLimitExceeded, "colour would need too much memory");
+  }
+  const std::size_t at = in.offset();
+  const ByteSpan symbols = in.raw(in.left());
+  Channel channel{info, Bytes(voxels.size() * info.stride())};
+  const ColorTree tree(voxels, head.settings.coarse);
+  const bool whole = head.settings.coarse ? read_colors<CoarseColorModels>(symbols, tree, head, channel)
+                                          : read_colors<ColorModels>(symbols, tree, head, channel);
+  if (!whole) return make_error(ErrorCode::kTruncated, "colours end too early", at);
   return channel;
 }
 

@@ -103,7 +103,7 @@ double rgb_distance(const Channel& a, const Channel& b, std::size_t i) {
 class ColorEncoder::Search {
  public:
   Search(const Channel& values, ColorScale scale, std::span<const VoxelCoord> voxels)
-      : values_(values), tree_(voxels), originals_(values, scale) {
+      : values_(values), tree_(voxels, false), originals_(values, scale) {
     settings_.scale = scale;
     ColorPoint m = originals_.mean(0, tree_.points());
     for (std::size_t c = 0; c < 3; ++c) {
@@ -238,10 +238,11 @@ void write_color_head(ByteWriter& out, const ColorSettings& settings, const Colo
   out.u8(kColorSection);
   out.u8(static_cast<std::uint8_t>((settings.split_cells ? 1 : 0) |
                                    (settings.scale == ColorScale::sixteen ? 2 : 0) |
-                                   (settings.coarse ? 4 : 0)));
+                                   (settings.coarse ? 8 : 0)));
   out.varint(settings.step);
   out.u8(static_cast<std::uint8_t>(settings.levels));
   for (const std::int64_t c : root) out.signed_varint(c);
+  if (settings.coarse) out.u8(settings.trust);
 }
 
 ColorScale color_scale_of(const Channel& values) {

@@ -33,6 +33,13 @@ std::pair<std::uint32_t, std::size_t> finest_cells(const Splits& splits, std::si
   return {shift, cells};
 }
 
+std::uint32_t child_of(const ColorLevel& level, std::uint32_t node, std::uint32_t octant) {
+  if (node == kNoNode) return kNoNode;
+  const ColorNode& n = level.nodes[node];
+  if (((n.mask >> octant) & 1) == 0) return kNoNode;
+  return n.child + kOctantRank[n.mask][octant] - 1;
+}
+
 }  // namespace
 
 std::uint64_t ColorTree::count_nodes(std::span<const VoxelCoord> voxels) {
@@ -43,11 +50,16 @@ std::uint64_t ColorTree::count_nodes(std::span<const VoxelCoord> voxels) {
   return nodes;
 }
 
-ColorTree::ColorTree(std::span<const VoxelCoord> voxels)
+ColorTree::ColorTree(std::span<const VoxelCoord> voxels, bool edges)
     : points_(static_cast<std::uint32_t>(voxels.size())) {
   build_levels(voxels);
   levels_.front().nodes.front().faces.fill(kNoNode);
-  for (std::size_t l = 1; l < levels_.size(); ++l) link_faces(levels_[l], levels_[l - 1]);
+  // Finest cells are not split any more: nobody asks what is around them.
+  for (std::size_t l = 1; l + 1 < levels_.size(); ++l) link_faces(levels_[l], levels_[l - 1]);
+  if (!edges) return;
+  levels_.front().edges.resize(1);
+  levels_.front().edges.front().fill(kNoNode);
+  for (std::size_t l = 1; l + 1 < levels_.size(); ++l) link_edges(levels_[l], levels_[l - 1]);
 }
 
 void ColorTree::build_levels(std::span<const VoxelCoord> voxels) {
@@ -87,12 +99,7 @@ void ColorTree::build_levels(std::span<const VoxelCoord> voxels) {
   std::reverse(levels_.begin(), levels_.end());
 }
 
-void ColorTree::link_faces(ColorLevel& level, const ColorLevel& parent) const {
-  const auto child_of = [&](std::uint32_t node, std::uint32_t octant) {
-    const ColorNode& n = parent.nodes[node];
-    if (((n.mask >> octant) & 1) == 0) return kNoNode;
-    return n.child + kOctantRank[n.mask][octant] - 1;
-  };
+void ColorTree::link_faces(ColorLevel& level, const ColorLevel& parent) {
   for (std::uint32_t p = 0; p < parent.size(); ++p) {
     const ColorNode& n = parent.nodes[p];
     std::uint32_t at = n.child;
@@ -102,8 +109,33 @@ void ColorTree::link_faces(ColorLevel& level, const ColorLevel& parent) const {
       for (std::uint32_t axis = 0; axis < 3; ++axis) {
         const std::uint32_t high = (octant >> axis) & 1, mirrored = octant ^ (1u << axis);
         const std::uint32_t outer = n.faces[2 * axis + high];
-        node.faces[2 * axis + (high ^ 1)] = child_of(p, mirrored);
-        node.faces[2 * axis + high] = outer == kNoNode ? kNoNode : child_of(outer, mirrored);
+        node.faces[2 * axis + (high ^ 1)] = child_of(parent, p, mirrored);
+        node.faces[2 * axis + high] = child_of(parent, outer, mirrored);
+      }
+    }
+  }
+}
+
+void ColorTree::link_edges(ColorLevel& level, const ColorLevel& parent) {
+  level.edges.resize(level.size());
+  for (std::uint32_t p = 0; p < parent.size(); ++p) {
+    const ColorNode& n = parent.nodes[p];
+    std::uint32_t at = n.child;
+    for (std::uint32_t octant = 0; octant < 8; ++octant) {
+      if (((n.mask >> octant) & 1) == 0) continue;
+      EdgeNodes& edges = level.edges[at++];
+      for (std::uint32_t pair = 0; pair < 3; ++pair) {
+        const auto [u, v] = kEdgeAxes[pair];
+        const std::uint32_t high_u = (octant >> u) & 1, high_v = (octant >> v) & 1;
+        for (std::uint32_t side = 0; side < 4; ++side) {
+          const std::uint32_t side_u = side & 1, side_v = side >> 1;
+          // The parent that the neighbour is in: beyond an edge, a face or none of this one.
+          const std::uint32_t cell = side_u == high_u && side_v == high_v ? parent.edges[p][4 * pair + side]
+                                     : side_u == high_u                   ? n.faces[2 * u + side_u]
+                                     : side_v == high_v                   ? n.faces[2 * v + side_v]
+                                                                          : p;
+          edges[4 * pair + side] = child_of(parent, cell, octant ^ (1u << u) ^ (1u << v));
+        }
       }
     }
   }

@@ -18,13 +18,21 @@ struct ColorNode {
   std::uint32_t begin = 0;
   std::uint32_t child = 0;               ///< index of its first child in the level below
   std::uint8_t mask = 0;                 ///< octants that hold points
-  std::array<std::uint32_t, 6> faces{};  ///< nodes of this level across -x, +x, -y, +y, -z, +z, or kNoNode
+  std::array<std::uint32_t, 6> faces{};  ///< nodes of this level across -x, +x, -y, +y, -z, +z, or kNoNode;
+                                         ///< not of the finest level
 };
+
+/// Nodes across a cell's edges, or kNoNode: four for each pair of axes (x y, x z, y z), low low, high low,
+/// low high, high high.
+using EdgeNodes = std::array<std::uint32_t, 12>;
+/// The axes of a pair.
+inline constexpr std::array<std::array<std::uint32_t, 2>, 3> kEdgeAxes{{{0, 1}, {0, 2}, {1, 2}}};
 
 /// One level, nodes in Morton order; the last entry is a sentinel, of which only `begin` and `child` mean
 /// something.
 struct ColorLevel {
   std::vector<ColorNode> nodes;
+  std::vector<EdgeNodes> edges;  ///< by the node; none in the finest level, or if the tree is without
   [[nodiscard]] std::size_t size() const { return nodes.size() - 1; }
   [[nodiscard]] std::uint32_t weight(std::size_t n) const { return nodes[n + 1].begin - nodes[n].begin; }
 };
@@ -35,7 +43,8 @@ class ColorTree {
   [[nodiscard]] static std::uint64_t count_nodes(std::span<const VoxelCoord> voxels);
 
   /// @param voxels  Morton-sorted (equal ones adjacent), not empty, coordinates below 2^21.
-  explicit ColorTree(std::span<const VoxelCoord> voxels);
+  /// @param edges  whether neighbours across edges are wanted beside those across faces.
+  ColorTree(std::span<const VoxelCoord> voxels, bool edges);
 
   /// levels()[0] is the root alone; the last one holds the finest cells.
   [[nodiscard]] const std::vector<ColorLevel>& levels() const { return levels_; }
@@ -43,7 +52,8 @@ class ColorTree {
 
  private:
   void build_levels(std::span<const VoxelCoord> voxels);
-  void link_faces(ColorLevel& level, const ColorLevel& parent) const;
+  static void link_faces(ColorLevel& level, const ColorLevel& parent);
+  static void link_edges(ColorLevel& level, const ColorLevel& parent);
 
   std::uint32_t points_;
   std::vector<ColorLevel> levels_;

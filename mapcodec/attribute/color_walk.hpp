@@ -20,20 +20,26 @@ struct ColorSettings {
   std::uint32_t levels = 0;  ///< levels whose splits are coded; deeper ones are only predicted
   bool split_cells = false;  ///< points that share a finest cell get values of their own
   ColorScale scale = ColorScale::eight;
-  bool coarse =
-      false;  ///< for steps so wide that most splits have no symbols: what is predicted counts in contexts
+  bool coarse = false;     ///< for steps so wide that most splits have no symbols (FORMAT.md 8.6)
+  std::uint8_t trust = 0;  ///< coarse: how much of a predicted difference is believed, 1/16
 };
+inline constexpr std::uint8_t kMostTrust = 64;
 
 /// What is known of a split before its symbols.
 struct SplitContext {
   std::uint32_t gain = 0;    ///< binary logarithm of v w / (v + w), 0..15
   std::uint32_t around = 0;  ///< symbols of the cells around, 0..5
   std::uint32_t above = 0;   ///< symbols of the cell above, 0..3
-  // Coarse settings only:
-  bool coarse = false;
-  std::uint32_t busy = 0;                   ///< symbols of all these and of the cell itself so far, 0..11
-  std::array<std::uint32_t, 3> expected{};  ///< size of the predicted difference to a step, 0..7
-  std::array<bool, 3> expected_negative{};
+  // Coarse settings only. Symbols, sizes: their bit lengths.
+  std::uint32_t beside = 0;    ///< symbols of the cell before and those before across faces, 0..11
+  std::uint32_t handed = 0;    ///< symbols of the cell above, 0..8
+  std::uint32_t diagonal = 0;  ///< symbols of the cells before across edges, 0..11
+  std::uint32_t ahead = 0;     ///< symbols above the cells around that come later, 0..11
+  std::uint32_t here = 0;      ///< symbols of the cell itself so far, 0..7
+  std::uint32_t busy = 0;      ///< of `beside`, `handed` and `here` together, 0..11
+  std::array<std::uint32_t, 3> contrast{};  ///< largest difference to a cell around, 1/16 step, 0..11
+  std::array<std::uint32_t, 3> expected{};  ///< size of the predicted difference, 1/16 step, 0..7
+  ColorPoint predicted{};
 };
 
 /// v w / (v + w) in 1/65536.
@@ -76,6 +82,7 @@ class ColorWalk {
     for (std::size_t v = 1; v < kSmall; ++v) {
       for (std::size_t w = 1; w < kSmall; ++w) small_[v * kSmall + w] = split_scale(v, w);
     }
+    for (std::size_t c = 0; c < 3; ++c) per_doubt_[c] = (std::int64_t{1} << 40) / ((steps_[c] >> 7) + 1);
   }
 
   /// @return the decoded mean of each finest cell. False in `policy_.ok()` ends it early.
@@ -141,7 +148,7 @@ class ColorWalk {
     const ColorNode& node = level.nodes[n];
     load_groups(level, below, n);
     symbols_ = 0;
-    set_context(node, n);
+    set_context(level, n);
     groups_.mean[1] = means_[n];
     for (std::size_t g = 1; g < 8; ++g) {
       if (groups_.weight[g] > 0) split_group(g);
@@ -202,11 +209,11 @@ class ColorWalk {
   /// Mean of the cell and of what lies across the three faces that the child touches: the touching child
   /// there if it is decoded already, else the whole cell.
   [[nodiscard]] ColorPoint predict(const ColorLevel& level, std::uint32_t n, std::uint32_t octant) const {
+    if (settings_.coarse) return predict_coarse(level, n, octant);
     const ColorNode& node = level.nodes[n];
-    const std::int64_t own = settings_.coarse ? kOwnWeightOfCoarse : kOwnWeight;
-    std::int64_t weight = own;
+    std::int64_t weight = kOwnWeight;
     ColorPoint sum{};
-    for (std::size_t c = 0; c < 3; ++c) sum[c] = means_[n][c] * own;
+    for (std::size_t c = 0; c < 3; ++c) sum[c] = means_[n][c] * kOwnWeight;
     for (std::uint32_t axis = 0; axis < 3; ++axis) {
       const std::uint32_t face = node.faces[2 * axis + ((octant >> axis) & 1)];
       if (face == kNoNode) continue;
@@ -224,7 +231,46 @@ class ColorWalk {
     return sum;
   }
 
-  void set_context(const ColorNode& node, std::uint32_t n) {
+  /// Across edges too, and the less believed the more it differs from the cell itself: beyond an edge in the
+  /// picture colours say nothing of this side.
+  [[nodiscard]] ColorPoint predict_coarse(const ColorLevel& level, std::uint32_t n,
+                                          std::uint32_t octant) const {
+    const ColorPoint& own = means_[n];
+    std::int64_t weight = kOwnWeightOfCoarse;
+    ColorPoint sum{};
+    const auto add = [&](std::uint32_t at, std::uint32_t touching_octant, std::int64_t whole,
+                         std::int64_t touching) {
+      if (at == kNoNode) return;
+      const ColorNode& other = level.nodes[at];
+      const bool is_child = at < n && ((other.mask >> touching_octant) & 1) != 0;
+      const ColorPoint& value =
+          is_child ? next_[other.child + kOctantRank[other.mask][touching_octant] - 1] : means_[at];
+      const std::int64_t w = is_child ? touching : whole;
+      for (std::size_t c = 0; c < 3; ++c) sum[c] += w * doubted(value[c] - own[c], c);
+      weight += w;
+    };
+    const ColorNode& node = level.nodes[n];
+    for (std::uint32_t axis = 0; axis < 3; ++axis) {
+      add(node.faces[2 * axis + ((octant >> axis) & 1)], octant ^ (1u << axis), kFaceWeight,
+          kTouchingFaceWeight);
+    }
+    for (std::uint32_t pair = 0; pair < 3; ++pair) {
+      const auto [u, v] = kEdgeAxes[pair];
+      const std::uint32_t side = ((octant >> u) & 1) | (((octant >> v) & 1) << 1);
+      add(level.edges[n][4 * pair + side], octant ^ (1u << u) ^ (1u << v), kEdgeWeight, kTouchingEdgeWeight);
+    }
+    for (std::size_t c = 0; c < 3; ++c)
+      sum[c] = own[c] + ((sum[c] * kReciprocal[static_cast<std::size_t>(weight)]) >> 16);
+    return sum;
+  }
+  /// x / (1 + (x / 2 steps)^2), about.
+  [[nodiscard]] std::int64_t doubted(std::int64_t x, std::size_t c) const {
+    const auto size = static_cast<std::uint64_t>(((x < 0 ? -x : x) * per_doubt_[c]) >> 36);
+    return (x * kBelief[std::min<std::uint64_t>(size, kBelief.size() - 1)]) >> 8;
+  }
+
+  void set_context(const ColorLevel& level, std::uint32_t n) {
+    const ColorNode& node = level.nodes[n];
     std::uint32_t around = n > 0 ? node_activity_[n - 1] : 0;
     for (std::size_t f = 0; f < 6; f += 2) {
       if (node.faces[f] != kNoNode) around += node_activity_[node.faces[f]];
@@ -232,8 +278,30 @@ class ColorWalk {
     context_.around = std::min<std::uint32_t>(static_cast<std::uint32_t>(std::bit_width(around)), 5);
     context_.above =
         std::min<std::uint32_t>(static_cast<std::uint32_t>(std::bit_width(std::uint32_t{activity_[n]})), 3);
-    context_.coarse = settings_.coarse;
-    busy_ = 2 * around + 3 * std::uint32_t{activity_[n]};
+    if (settings_.coarse) set_coarse_context(level, n, around);
+  }
+
+  void set_coarse_context(const ColorLevel& level, std::uint32_t n, std::uint32_t beside) {
+    std::uint32_t diagonal = 0, ahead = 0;
+    for (const std::uint32_t e : level.edges[n]) {
+      if (e == kNoNode) continue;
+      (e < n ? diagonal : ahead) += e < n ? node_activity_[e] : activity_[e];
+    }
+    contrast_ = {};
+    for (const std::uint32_t f : level.nodes[n].faces) {
+      if (f == kNoNode) continue;
+      if (f > n) ahead += 2 * std::uint32_t{activity_[f]};
+      for (std::size_t c = 0; c < 3; ++c)
+        contrast_[c] = std::max(contrast_[c], std::abs(means_[f][c] - means_[n][c]));
+    }
+    busy_ = 2 * beside + 3 * std::uint32_t{activity_[n]};
+    context_.beside = bit_length(beside, 11);
+    context_.handed = bit_length(activity_[n], 8);
+    context_.diagonal = bit_length(diagonal, 11);
+    context_.ahead = bit_length(ahead, 11);
+  }
+  [[nodiscard]] static std::uint32_t bit_length(std::uint64_t v, std::uint32_t most) {
+    return std::min(static_cast<std::uint32_t>(std::bit_width(v)), most);
   }
 
   void split_group(std::size_t g) {
@@ -247,6 +315,7 @@ class ColorWalk {
     for (std::size_t c = 0; c < 3; ++c) {
       predicted[c] =
           divide_by_weight(groups_.predicted[b][c], w) - divide_by_weight(groups_.predicted[a][c], v);
+      if (settings_.coarse) predicted[c] = (predicted[c] * settings_.trust) >> 4;
       if constexpr (Policy::kKnows) {
         wanted[c] = divide_by_weight(groups_.truth[b][c], w) - divide_by_weight(groups_.truth[a][c], v) -
                     predicted[c];
@@ -300,17 +369,27 @@ class ColorWalk {
   }
 
   void expect(const ColorPoint& d, const ColorPoint& steps) {
-    context_.busy = std::min(11u, static_cast<std::uint32_t>(std::bit_width(busy_ + 4 * symbols_)));
+    context_.here = bit_length(symbols_, 7);
+    context_.busy = bit_length(busy_ + 4 * symbols_, 11);
+    context_.predicted = d;
     for (std::size_t c = 0; c < 3; ++c) {
       const auto size = static_cast<std::uint64_t>(d[c] < 0 ? -d[c] : d[c]);
-      context_.expected[c] = std::min(
-          7u, static_cast<std::uint32_t>(std::bit_width(16 * size / static_cast<std::uint64_t>(steps[c]))));
-      context_.expected_negative[c] = d[c] < 0;
+      const auto step = static_cast<std::uint64_t>(steps[c]);
+      context_.expected[c] = bit_length(16 * size / step, 7);
+      context_.contrast[c] = bit_length(16 * static_cast<std::uint64_t>(contrast_[c]) / step, 11);
     }
   }
 
   static constexpr std::size_t kSmall = 16;
-  static constexpr std::int64_t kOwnWeight = 4, kOwnWeightOfCoarse = 8, kFaceWeight = 2, kChildWeight = 3;
+  static constexpr std::int64_t kOwnWeight = 4, kFaceWeight = 2, kChildWeight = 3;
+  static constexpr std::int64_t kOwnWeightOfCoarse = 8, kTouchingFaceWeight = 4, kEdgeWeight = 1,
+                                kTouchingEdgeWeight = 2;
+  /// 256 / (1 + (i / 16)^2)
+  static constexpr std::array<std::int64_t, 128> kBelief = [] {
+    std::array<std::int64_t, 128> t{};
+    for (std::size_t i = 0; i < t.size(); ++i) t[i] = static_cast<std::int64_t>(65536 / (256 + i * i));
+    return t;
+  }();
   static constexpr std::array<std::int64_t, 32> kReciprocal = [] {
     std::array<std::int64_t, 32> r{};
     for (std::size_t i = 1; i < 32; ++i)
@@ -324,12 +403,14 @@ class ColorWalk {
   const ColorSettings settings_;
   Policy& policy_;
   ColorPoint steps_{};
+  ColorPoint per_doubt_{};                           ///< 1/16 of what is half believed, inverse
   std::array<SplitScale, kSmall * kSmall> small_{};  ///< [v][w]
   SplitScale large_{};
   std::vector<ColorPoint> means_, next_;
   std::vector<std::uint8_t> activity_, next_activity_, node_activity_;
   Groups groups_;
   SplitContext context_;
+  ColorPoint contrast_{};
   std::uint32_t symbols_ = 0, busy_ = 0;
   bool coded_ = true;
 };

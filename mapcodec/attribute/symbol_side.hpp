@@ -15,6 +15,10 @@ class SymbolWriter {
     out_.encode(v, m);
     return v;
   }
+  bool bit(bool v, std::uint32_t probability) {
+    out_.encode(v, probability);
+    return v;
+  }
   std::uint64_t raw(std::uint64_t v, int count) {
     out_.encode_raw(v, count);
     return v;
@@ -31,6 +35,7 @@ class SymbolReader {
   static constexpr bool kReads = true;
   explicit SymbolReader(ByteSpan bytes) : in_(bytes) {}
   bool bit(bool, BitModel& m) { return in_.decode(m); }
+  bool bit(bool, std::uint32_t probability) { return in_.decode(probability); }
   std::uint64_t raw(std::uint64_t, int count) { return in_.decode_raw(count); }
   [[nodiscard]] bool ok() const { return in_.ok(); }
   [[nodiscard]] std::size_t left() const { return in_.left(); }  ///< bytes not read yet

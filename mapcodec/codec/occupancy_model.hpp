@@ -88,9 +88,9 @@ class StructureModel {
   template <class Side>
   static std::uint32_t code_cell(Side& side, const Rows& r, LogisticMixer* mixers, unsigned height,
                                  std::uint32_t known) {
-    if (height > 1 && code_mixed(side, known == 3, r.a[0], r.b[0], r.c[0], mixers[0])) return 3;
-    if (code_mixed(side, known == 0, r.a[1], r.b[1], r.c[1], mixers[1])) return 0;
-    return code_mixed(side, known == 2, r.a[2], r.b[2], r.c[2], mixers[2]) ? 2 : 1;
+    if (height > 1 && code_mixed(side, known == 3, mixers[0], r.a[0], r.b[0], r.c[0])) return 3;
+    if (code_mixed(side, known == 0, mixers[1], r.a[1], r.b[1], r.c[1])) return 0;
+    return code_mixed(side, known == 2, mixers[2], r.a[2], r.b[2], r.c[2]) ? 2 : 1;
   }
 
   HashedModels siblings_, faces_, around_;

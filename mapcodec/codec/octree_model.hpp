@@ -186,7 +186,7 @@ class Model {
       BitModel& a = occupancy_[(touch & 0xff) * kHistories + history];
       BitModel& b = by_slab_[history * 8 + (slab & 7)];
       BitModel& c = by_size_[history * 64 + size];
-      const bool bit = code_mixed(side, (known >> i & 1) != 0, a, b, c, mixers_[i]);
+      const bool bit = code_mixed(side, (known >> i & 1) != 0, mixers_[i], a, b, c);
       history = 2 * history + bit;
       mask |= std::uint32_t{bit} << i;
     }

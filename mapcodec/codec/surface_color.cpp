@@ -16,13 +16,19 @@ using Rgb = std::array<float, 3>;
 
 // Found by measuring sizes at equal error: what a bit costs, in shares of what a step costs; how near to the
 // median distances are all alike; how much of the bound merging points into voxels may take.
-constexpr double kPrice = 0.24, kAlike = 0.7, kFloorShare = 0.45, kLeastFloor = 1.03;
+constexpr double kPrice = 0.22, kAlike = 0.7, kFloorShare = 0.25, kLeastFloor = 1.03;
 constexpr double kAboveLeast = 1.05;
 constexpr int kMedianRounds = 6;
 
 float distance(const Rgb& a, const Rgb& b) {
   const float x = a[0] - b[0], y = a[1] - b[1], z = a[2] - b[2];
   return std::sqrt(x * x + y * y + z * z);
+}
+
+Rgb load_levels(const Channel& c, std::size_t i, ColorScale scale) {
+  const auto v = load_rgb(c, i);
+  const float unit = scale == ColorScale::sixteen ? 1.0f / 257 : 1.0f;
+  return {static_cast<float>(v[0]) * unit, static_cast<float>(v[1]) * unit, static_cast<float>(v[2]) * unit};
 }
 
 /// An original colour that a decoded point is compared with.
@@ -45,11 +51,11 @@ class Comparisons {
     std::vector<std::uint32_t> next(begin_.begin(), begin_.end() - 1);
     const double forth = static_cast<double>(n) / static_cast<double>(near.forth.index.size());
     for (std::size_t i = 0; i < near.forth.index.size(); ++i)
-      samples_[next[near.forth.index[i]]++] = {load(original, i, scale), static_cast<float>(forth)};
+      samples_[next[near.forth.index[i]]++] = {load_levels(original, i, scale), static_cast<float>(forth)};
     for (std::size_t j = 0; j < n; ++j) {
       const auto same = ties.of(near.back.index[j]);
       for (const std::uint32_t i : same)
-        samples_[next[j]++] = {load(original, i, scale), 1.0f / static_cast<float>(same.size())};
+        samples_[next[j]++] = {load_levels(original, i, scale), 1.0f / static_cast<float>(same.size())};
     }
   }
   [[nodiscard]] std::span<const Sample> of(std::uint32_t j) const {
@@ -57,12 +63,6 @@ class Comparisons {
   }
 
  private:
-  static Rgb load(const Channel& c, std::size_t i, ColorScale scale) {
-    const auto v = load_rgb(c, i);
-    const float unit = scale == ColorScale::sixteen ? 1.0f / 257 : 1.0f;
-    return {static_cast<float>(v[0]) * unit, static_cast<float>(v[1]) * unit,
-            static_cast<float>(v[2]) * unit};
-  }
   std::vector<std::uint32_t> begin_;
   std::vector<Sample> samples_;
 };
@@ -119,6 +119,7 @@ class SurfaceColorEncoder::Search {
     prepare(std::max(kFloorShare * bound, kLeastFloor * least_));
     aims_ = on_->aims;
     first_ = true;
+    trust_ = CoarseColorEncoder::kUsualTrust;
     usual_ = std::max(bound, 1.0);
     SurfaceColor best = slope > 0 ? code_at(slope) : code_within(bound);
     best.least_error = least_;
@@ -207,23 +208,20 @@ class SurfaceColorEncoder::Search {
     // Weights are about two comparisons over the usual distance.
     if (first_) std::fill(aims_.weights.begin(), aims_.weights.end(), static_cast<float>(2 / usual_));
     first_ = false;
-    ChannelEncoding e = encoder_->encode(
-        aims_, static_cast<std::uint32_t>(std::clamp(16 * step, 1.0, 1048576.0)), kPrice * slope);
+    CoarseColors e = encoder_->encode(
+        aims_, static_cast<std::uint32_t>(std::clamp(16 * step, 1.0, 1048576.0)), kPrice * slope, trust_);
+    trust_ = e.trust;
     SurfaceColor r{std::move(e.bytes), on_->shift, error_of(e.decoded, *on_)};
     learn(e.decoded, static_cast<float>(std::max(1.0, kAlike * r.error)));
+    center_runs(e.decoded, e.runs);
     return r;
   }
 
   void learn(const Channel& decoded, float alike) {
-    const float unit = scale_ == ColorScale::sixteen ? 1.0f / 257 : 1.0f;
     double sum = 0;
     for_each_voxel(*on_, [&](std::uint32_t begin, std::uint32_t end, std::span<const Sample> samples) {
-      const auto v = load_rgb(decoded, begin);
       float weight = 0;
-      const Rgb aim = mean_around(
-          samples,
-          {static_cast<float>(v[0]) * unit, static_cast<float>(v[1]) * unit, static_cast<float>(v[2]) * unit},
-          alike, weight);
+      const Rgb aim = mean_around(samples, load_levels(decoded, begin, scale_), alike, weight);
       sum += double(weight);
       for (std::uint32_t i = begin; i < end; ++i) {
         aims_.rgb[i] = aim;
@@ -233,29 +231,60 @@ class SurfaceColorEncoder::Search {
     usual_ = 2 * static_cast<double>(on_->sorted.order.size()) / sum;
   }
 
+  /// A run without symbols gets the plain mean of its aims, but the mean by weights is what it should have:
+  /// its aims are moved by the difference.
+  void center_runs(const Channel& decoded, std::span<const std::uint32_t> runs) {
+    for (std::size_t k = 0; k + 1 < runs.size(); ++k) {
+      const std::uint32_t begin = runs[k], end = runs[k + 1];
+      double weights = 0;
+      std::array<double, 3> weighed{}, plain{};
+      for (std::uint32_t i = begin; i < end; ++i) {
+        const Rgb there = load_levels(decoded, i, scale_);
+        const double weight = aims_.weights[i];
+        weights += weight;
+        for (std::size_t c = 0; c < 3; ++c) {
+          const double off = double(aims_.rgb[i][c]) - double(there[c]);
+          weighed[c] += weight * off;
+          plain[c] += off;
+        }
+      }
+      for (std::size_t c = 0; c < 3; ++c) {
+        const auto move = static_cast<float>(weighed[c] / weights - plain[c] / double(end - begin));
+        for (std::uint32_t i = begin; i < end; ++i) aims_.rgb[i][c] += move;
+      }
+    }
+  }
+
   SurfaceColor code_at(double slope) {
     SurfaceColor r = code(slope);
     for (int i = 1; i < passes_; ++i) r = code(slope);
     return r;
   }
 
-  /// Slopes by secants in logarithms until the error is near the bound.
+  /// Slopes by secants in logarithms until the error is near the bound: bits fall with about its fifth power.
   SurfaceColor code_within(double bound) {
-    constexpr int kTries = 8;
-    constexpr double kAim = 0.985, kNear = 0.965, kExponent = 0.22;
-    double slope = 20 * bound, low = 0, high = 0;
+    constexpr int kTries = 9;
+    constexpr double kAim = 0.993, kNear = 0.985, kUsualExponent = 0.22;
+    const double aim = std::log(kAim * bound);
+    double at = std::log(20 * bound), exponent = kUsualExponent, low = -INFINITY, high = INFINITY;
+    double last_at = 0, last_error = 0;
     std::optional<SurfaceColor> best;
     for (int i = 0; i < kTries; ++i) {
-      SurfaceColor r = code(slope);
-      const bool kept = r.error <= bound;
-      (kept ? low : high) = slope;
-      const double over = kAim * bound / std::max(r.error, 1e-3);
-      const bool near = kept && r.error >= kNear * bound;
+      SurfaceColor r = code(std::exp(at));
+      const double error = std::log(std::max(r.error, 1e-3));
+      const bool near = r.error <= bound && r.error >= kNear * bound;
       if (!best || is_better(r, *best, bound)) best = std::move(r);
       if (near && i + 1 >= passes_) break;
-      slope *= std::clamp(std::pow(over, 1 / kExponent), 1.0 / 16, 16.0);
-      if (low > 0 && high > 0 && low < high && (slope <= low || slope >= high)) slope = std::sqrt(low * high);
-      slope = std::clamp(slope, 1e-4, 1e8);
+      // The first codings still learn what to aim at: their errors say little of the next ones'.
+      if (i + 1 >= passes_) (error < aim ? low : high) = at;
+      if (i >= passes_ && std::abs(at - last_at) > 0.02)
+        exponent = std::clamp((error - last_error) / (at - last_at), 0.05, 0.6);
+      last_at = at;
+      last_error = error;
+      at += std::clamp((aim - error) / exponent, -2.8, 2.8);
+      if (std::isfinite(low) && std::isfinite(high) && low < high)
+        at = std::clamp(at, low + (high - low) / 8, high - (high - low) / 8);
+      at = std::clamp(at, -9.0, 18.0);
     }
     return std::move(*best);
   }
@@ -277,6 +306,7 @@ class SurfaceColorEncoder::Search {
   std::optional<CoarseColorEncoder> encoder_;
   ColorAims aims_;    ///< of the next coding
   double usual_ = 1;  ///< harmonic mean of the distances
+  std::uint8_t trust_ = 0;
   bool first_ = true;
 };
 

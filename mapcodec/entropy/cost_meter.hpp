@@ -12,8 +12,10 @@ namespace mapcodec {
 /// A "side" of the code that only counts [bits]. Models stay as they are.
 class CostMeter {
  public:
-  bool bit(bool v, const BitModel& m) {
-    const std::uint32_t p = v ? m.probability() : 65536 - m.probability();
+  static constexpr bool kOnlyCounts = true;
+  bool bit(bool v, const BitModel& m) { return bit(v, m.probability()); }
+  bool bit(bool v, std::uint32_t one) {
+    const std::uint32_t p = v ? one : 65536 - one;
     bits_ += kCost[p >> 6];
     return v;
   }

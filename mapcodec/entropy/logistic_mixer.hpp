@@ -65,19 +65,23 @@ inline constexpr std::array<std::uint16_t, 4096> kSquash = [] {
 
 }  // namespace logistic
 
-/// Weights of three inputs, 1.0 = 65536. One mixer per small context that says which input to trust.
-class LogisticMixer {
+/// Weights of the inputs, 1.0 = 65536. One mixer per small context that says which input to trust.
+/// @tparam kRateShift  16: weights learn 2^-8 per (probability x logit); less: faster.
+template <std::size_t kInputs, int kRateShift = 16>
+class LogisticMixerOf {
  public:
-  /// Logits of the three inputs and the mixed probability; kept between predict and update.
+  /// Logits of the inputs and the mixed probability; kept between predict and update.
   struct Mixed {
-    std::array<std::int32_t, 3> logit;
+    std::array<std::int32_t, kInputs> logit;
     std::uint32_t probability;
   };
 
-  [[nodiscard]] Mixed predict(const BitModel& a, const BitModel& b, const BitModel& c) const {
-    Mixed m{{stretch(a), stretch(b), stretch(c)}, 0};
+  template <class... Models>
+  [[nodiscard]] Mixed predict(const Models&... inputs) const {
+    static_assert(sizeof...(Models) == kInputs);
+    Mixed m{{stretch(inputs)...}, 0};
     std::int64_t dot = 0;
-    for (std::size_t i = 0; i < 3; ++i) dot += std::int64_t{weight_[i]} * m.logit[i];
+    for (std::size_t i = 0; i < kInputs; ++i) dot += std::int64_t{weight_[i]} * m.logit[i];
     std::int64_t logit = dot >> 16;
     if (logit > logistic::kMaxLogit) logit = logistic::kMaxLogit;
     if (logit < -logistic::kMaxLogit) logit = -logistic::kMaxLogit;
@@ -87,33 +91,37 @@ class LogisticMixer {
 
   void update(const Mixed& m, bool bit) {
     const std::int32_t error = (bit ? 65535 : 0) - static_cast<std::int32_t>(m.probability);
-    for (std::size_t i = 0; i < 3; ++i) {
+    for (std::size_t i = 0; i < kInputs; ++i) {
       const std::int32_t w = weight_[i] + ((m.logit[i] * error + kHalf) >> kRateShift);
       weight_[i] = w > kMaxWeight ? kMaxWeight : (w < -kMaxWeight ? -kMaxWeight : w);
     }
   }
 
  private:
-  static constexpr int kRateShift = 16;  // learning rate 2^-8 in units of weight per (probability x logit)
   static constexpr std::int32_t kHalf = 1 << (kRateShift - 1);
   static constexpr std::int32_t kMaxWeight = 8 << 16;
 
   static std::int32_t stretch(const BitModel& m) { return logistic::kStretch[m.probability() >> 4]; }
 
-  std::array<std::int32_t, 3> weight_{26214, 19661, 19661};  // 0.4, 0.3, 0.3
+  std::array<std::int32_t, kInputs> weight_ = [] {
+    std::array<std::int32_t, kInputs> w;
+    w.fill(19661);  // 0.3
+    w[0] = 26214;   // 0.4
+    return w;
+  }();
 };
+using LogisticMixer = LogisticMixerOf<3>;
 
-/// Codes a bit with the mixture of three contexts and teaches all.
+/// Codes a bit with the mixture of several contexts and teaches all, unless the side only counts.
 /// @param side   writes `known`, or reads the bit (then `known` is not looked at).
-template <class Side>
-[[gnu::always_inline]] inline bool code_mixed(Side& side, bool known, BitModel& a, BitModel& b, BitModel& c,
-                                              LogisticMixer& mixer) {
-  const LogisticMixer::Mixed mixed = mixer.predict(a, b, c);
+template <class Side, class Mixer, class... Models>
+[[gnu::always_inline]] inline bool code_mixed(Side& side, bool known, Mixer& mixer, Models&... inputs) {
+  const auto mixed = mixer.predict(inputs...);
   const bool bit = side.bit(known, mixed.probability);
-  mixer.update(mixed, bit);
-  a.update(bit);
-  b.update(bit);
-  c.update(bit);
+  if constexpr (!requires { Side::kOnlyCounts; }) {
+    mixer.update(mixed, bit);
+    (inputs.update(bit), ...);
+  }
   return bit;
 }
 

@@ -4,7 +4,7 @@ import math
 import struct
 
 from read_archive import Damaged, Reader
-from tile_entropy import M64, BitModel, MagnitudeModel, Models, RangeDecoder, clamp
+from tile_entropy import M64, BitModel, MagnitudeModel, Mixer, Models, RangeDecoder, clamp
 
 SCALAR_SIZE = (0, 1, 1, 2, 2, 4, 4, 8, 8, 4, 8)
 F32, F64 = 9, 10
@@ -315,9 +315,8 @@ def build_tree(voxels):
 
 
 class Colors:
-    def __init__(self, d, step, coarse):
-        self.d, self.coarse = d, coarse
-        self.any_coarse, self.against = Models(), Models()
+    def __init__(self, d, step):
+        self.d = d
         self.steps = [step * length * 256 for length in (443, 362, 627)]
         self.any, self.zero, self.magnitude = Models(), Models(), Models(MagnitudeModel)
         self.symbols = 0
@@ -341,11 +340,11 @@ class Colors:
         around += sum(other.activity for other in (across(a, -1) for a in range(3)) if other)
         self.around = min(5, around.bit_length())
         self.above = min(3, cell.above.bit_length())
-        self.busy = 2 * around + 3 * cell.above
         self.symbols = 0
+        self.look_around(cell, level, places, around)
         weights, sums, means = [0] * 16, [[0, 0, 0] for _ in range(16)], [None] * 16
         for octant, child in cell.children.items():
-            predicted = self.predict(cell, octant, across)
+            predicted = self.predict(cell, octant, across, places)
             weights[8 + octant], sums[8 + octant] = child.weight, [p * child.weight for p in predicted]
         for g in range(7, 0, -1):
             weights[g] = weights[2 * g] + weights[2 * g + 1]
@@ -357,14 +356,20 @@ class Colors:
             if v == 0 or w == 0:
                 means[a] = means[b] = means[g]
             else:
-                d = [toward_zero(y, w) - toward_zero(x, v) for x, y in zip(sums[a], sums[b])]
+                d = [self.believe(toward_zero(y, w) - toward_zero(x, v)) for x, y in zip(sums[a], sums[b])]
                 means[a], means[b] = self.split(means[g], v, w, d, self.coded)
         cell.activity = min(self.symbols, 255)
         for octant, child in cell.children.items():
             child.mean, child.above = means[8 + octant], cell.activity
 
-    def predict(self, cell, octant, across):
-        weight = 8 if self.coarse else 4
+    def look_around(self, cell, level, places, around):
+        pass
+
+    def believe(self, difference):
+        return difference
+
+    def predict(self, cell, octant, across, places):
+        weight = 4
         total = [weight * m for m in cell.mean]
         for axis in range(3):
             other = across(axis, 1 if octant >> axis & 1 else -1)
@@ -381,30 +386,23 @@ class Colors:
             gain = (v * w // (v + w) << 16) + ((v * w % (v + w) << 16) // (v + w))
             root = math.isqrt(gain)
             steps = [step // root + 1 for step in self.steps]
-            self.expected = [min(7, (16 * abs(x) // t).bit_length()) for x, t in zip(d, steps)]
-            self.falls = [x < 0 for x in d]
-            for c, q in enumerate(self.read_symbols(clamp(gain.bit_length() - 16, 0, 15))):
+            for c, q in enumerate(self.read_symbols(clamp(gain.bit_length() - 16, 0, 15), d, steps)):
                 d[c] = clamp(d[c] + q * steps[c], -(1 << 24), 1 << 24)
                 self.symbols += min(abs(q), 15) * (2 if c == 0 else 1)
         share = (w << 16) // (v + w)
         low = [m - (x * share >> 16) for m, x in zip(mean, d)]
         return low, [m + x for m, x in zip(low, d)]
 
-    def read_symbols(self, gain):
+    def read_symbols(self, gain, d, steps):
         out = [0, 0, 0]
-        busy = min(11, (self.busy + 4 * self.symbols).bit_length()) if self.coarse else 0
-        any_model = self.any_coarse[gain, busy, self.expected[0]] if self.coarse else self.any[gain, self.around, self.above]
-        if not self.d.bit(any_model):
+        if not self.d.bit(self.any[gain, self.around, self.above]):
             return out
         before = 0
         for c in range(3):
             known = c == 2 and before == 0
             if not known and self.d.bit(self.zero[c, self.around, before]):
                 continue
-            if self.coarse:
-                negative = self.d.bit(self.against[c, self.expected[c]]) != self.falls[c]
-            else:
-                negative = self.d.raw(1)
+            negative = self.d.raw(1)
             q = (self.magnitude[c, self.around].decode(self.d) & 0xFFFFFF) + 1
             out[c] = -q if negative else q
             before |= 1 << min(c, 1)
@@ -421,12 +419,119 @@ class Colors:
         self.halve(middle, end, high, out)
 
 
+# --- 8.6 Coarse colour ----------------------------------------------------------------------------------------------
+
+EDGE_AXES = ((0, 1), (0, 2), (1, 2))
+
+
+def bits(v, most):
+    return min(most, v.bit_length())
+
+
+class CoarseColors(Colors):
+    """Edges count too, doubtful predictions less, and each bit is mixed."""
+
+    def __init__(self, d, step, trust):
+        super().__init__(d, step)
+        self.trust = trust
+        self.inverse = [(1 << 40) // ((s >> 7) + 1) for s in self.steps]
+        self.models, self.mixers = Models(), {}
+
+    def mixed(self, name, of, *keys):
+        """The bit `name`, by the mixer of `of` and a model for each key."""
+        mixer = self.mixers.setdefault((name, of), Mixer(len(keys), 15))
+        return mixer.decode(self.d, [self.models[name, n, key] for n, key in enumerate(keys)])
+
+    @staticmethod
+    def moved(cell, steps):
+        return tuple(x + steps.get(a, 0) for a, x in enumerate(cell.at))
+
+    def look_around(self, cell, level, places, around):
+        sides = [places.get(self.moved(cell, {a: by})) for a in range(3) for by in (-1, 1)]
+        sides = [s for s in sides if s]
+        edges = [places.get(self.moved(cell, {u: i, v: j})) for u, v in EDGE_AXES for i in (-1, 1) for j in (-1, 1)]
+        edges = [e for e in edges if e]
+        self.beside, self.handed = around, cell.above
+        self.diagonal = sum(e.activity for e in edges if e.place < cell.place)
+        self.ahead = sum(e.above for e in edges if e.place > cell.place)
+        self.ahead += sum(2 * s.above for s in sides if s.place > cell.place)
+        self.contrast = [max((abs(s.mean[c] - cell.mean[c]) for s in sides), default=0) for c in range(3)]
+
+    def believe(self, difference):
+        return difference * self.trust >> 4
+
+    def predict(self, cell, octant, across, places):
+        near = [({a: self.side(octant, a)}, 1 << a, 2, 4) for a in range(3)]
+        near += [({u: self.side(octant, u), v: self.side(octant, v)}, 1 << u | 1 << v, 1, 2) for u, v in EDGE_AXES]
+        total, weight = [0, 0, 0], 8
+        for steps, flips, whole, touching in near:
+            other = places.get(self.moved(cell, steps))
+            if other is None:
+                continue
+            child = other.children.get(octant ^ flips) if other.place < cell.place else None
+            w, mean = (touching, child.mean) if child else (whole, other.mean)
+            for c in range(3):
+                x = mean[c] - cell.mean[c]
+                doubt = min(127, abs(x) * self.inverse[c] >> 36)
+                total[c] += w * (x * (65536 // (256 + doubt * doubt)) >> 8)
+            weight += w
+        reciprocal = (65536 + weight // 2) // weight
+        return [m + (t * reciprocal >> 16) for m, t in zip(cell.mean, total)]
+
+    @staticmethod
+    def side(octant, axis):
+        return 1 if octant >> axis & 1 else -1
+
+    def read_symbols(self, gain, d, steps):
+        out = [0, 0, 0]
+        expected = [bits(16 * abs(x) // t, 7) for x, t in zip(d, steps)]
+        contrast = [bits(16 * x // t, 11) for x, t in zip(self.contrast, steps)]
+        here, ahead = bits(self.symbols, 7), bits(self.ahead, 11)
+        busy = bits(2 * self.beside + 3 * self.handed + 4 * self.symbols, 11)
+        if not self.mixed("any", gain, (gain, expected[0]), (gain, busy, expected[0]), (gain, contrast[0], here),
+                          (gain, bits(self.beside, 11), bits(self.handed, 8)),
+                          (gain, bits(self.diagonal, 11), ahead)):
+            return out
+        before = 0
+        for c in range(3):
+            sizes = [min(3, abs(q)) for q in out[:2]]
+            if not (c == 2 and before == 0) and self.mixed(
+                    "zero", (c, before), (c, before, self.around), (c, before, contrast[c], expected[c]),
+                    (c, before, gain, here), (c, before, *sizes, ahead)):
+                continue
+            falls = d[c] < 0
+            signs = [(q > 0) - (q < 0) for q in out[:2]]
+            negative = self.mixed("sign", c, (c, expected[c]), (c, falls, *signs)) != falls
+            length = 0
+            while length < 24:
+                l = min(length, 7)
+                if not self.mixed("longer", (c, l), (c, l, busy), (c, l, contrast[c], expected[c]),
+                                  (c, l, gain, before)):
+                    break
+                length += 1
+            q = self.mantissa(c, length) + 1
+            out[c] = -q if negative else q
+            before |= 1 << min(c, 1)
+        return out
+
+    def mantissa(self, c, length):
+        if length < 2:
+            return length
+        r = 1
+        for _ in range(min(length - 1, 2)):
+            r = r * 2 + self.d.bit(self.models["mantissa", c, min(length, 8), r])
+        raw = length - 1 - min(length - 1, 2)
+        return r << raw | self.d.raw(raw) if raw else r
+
+
 def read_colors(r, channel, voxels):
     flags, step, coded_levels = r.uint(1), r.varint(), r.uint(1)
     root = [256 * r.signed() for _ in range(3)]
-    if flags > 7 or flags & 5 == 5 or step == 0:
+    trust = r.uint(1) if flags & 8 else 0
+    if flags > 11 or flags & 4 or flags & 9 == 9 or trust > 64 or step == 0:
         raise Damaged("a broken colour head")
-    colors, levels = Colors(RangeDecoder(r.raw(r.left())), step, bool(flags & 4)), build_tree(voxels)
+    d = RangeDecoder(r.raw(r.left()))
+    colors, levels = CoarseColors(d, step, trust) if flags & 8 else Colors(d, step), build_tree(voxels)
     levels[0][0].mean = root
     colors.walk(levels, coded_levels)
     means = [None] * len(voxels)

@@ -145,8 +145,9 @@ SQUASH = [clamp(math.floor(65536 / (1 + math.exp((2048 - i) / 256)) + 0.5), 32, 
 
 
 class Mixer:
-    def __init__(self):
-        self.weights = [26214, 19661, 19661]
+    def __init__(self, inputs=3, rate=16):
+        self.weights = [26214] + [19661] * (inputs - 1)
+        self.rate, self.half = rate, 1 << (rate - 1)
 
     def decode(self, d, models):
         logits = [STRETCH[m.p() >> 4] for m in models]
@@ -154,7 +155,8 @@ class Mixer:
         p = SQUASH[clamp(dot >> 16, -2047, 2047) + 2048]
         bit = d.bit_of(p)
         error = (65535 if bit else 0) - p
-        self.weights = [clamp(w + ((s * error + 32768) >> 16), -524288, 524288) for w, s in zip(self.weights, logits)]
+        self.weights = [clamp(w + ((s * error + self.half) >> self.rate), -524288, 524288)
+                        for w, s in zip(self.weights, logits)]
         for m in models:
             m.update(bit)
         return bit

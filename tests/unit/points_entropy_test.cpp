@@ -119,5 +119,21 @@ TEST(LogisticMixer, LearnsWhichInputKnows) {
   EXPECT_LT(bits / 20000, 0.02);
 }
 
+TEST(LogisticMixer, OfFiveInputsToo) {
+  std::mt19937 rng(3);
+  LogisticMixerOf<5, 15> mixer;
+  BitModel guesses[4], knows[2];
+  double bits = 0;
+  for (int i = 0; i < 5000; ++i) {
+    const bool bit = rng() % 2 == 0;
+    const auto mixed = mixer.predict(guesses[0], guesses[1], guesses[2], guesses[3], knows[bit]);
+    bits -= std::log2((bit ? mixed.probability : 65536 - mixed.probability) / 65536.0);
+    mixer.update(mixed, bit);
+    knows[bit].update(bit);
+    for (BitModel& g : guesses) g.update(bit);
+  }
+  EXPECT_LT(bits / 5000, 0.05);
+}
+
 }  // namespace
 }  // namespace mapcodec
