@@ -81,10 +81,13 @@ TileErrors CodedSum::errors() const {
   return {rms_m(), max_axis_, color_ / points_, density_ / points_};
 }
 
-double worth_of_density(double density_error) {
-  // Beyond what is hardly seen, a hundredth has to save so many hundredths of a bit.
-  constexpr double kHardlySeen = 0.1, kWorth = 0.5;
-  return kWorth * std::max(0.0, density_error - kHardlySeen);
+double worth_of_density(double bits_per_point, double density_error, double rms_m) {
+  // Points that lie an rms off are 0.8 of it off along an axis, on average, and in other voxels of 10 cm by
+  // that much of their side: that, and what is hardly seen, is free. Beyond it a hundredth has to save so
+  // many hundredths of a bit, but no more than that share of the coding.
+  constexpr double kHardlySeen = 0.06, kMovedPerMetre = 8, kWorth = 0.5, kShare = 5;
+  const double free = kHardlySeen + kMovedPerMetre * rms_m;
+  return std::min(kWorth, kShare * bits_per_point) * std::max(0.0, density_error - free);
 }
 
 MapSchema positions_alone(MapSchema schema) {

@@ -62,8 +62,9 @@ class CodedSum {
 };
 
 /// What a density error counts when codings are compared [bits per point]. Surfaces of few large cells are
-/// small, but lose where the points were.
-[[nodiscard]] double worth_of_density(double density_error);
+/// small, but lose where the points were. @param bits_per_point  of the coding. @param rms_m  that is
+/// allowed: what comes of that alone is free.
+[[nodiscard]] double worth_of_density(double bits_per_point, double density_error, double rms_m);
 
 /// `schema` with all channels dropped: for positions alone.
 [[nodiscard]] MapSchema positions_alone(MapSchema schema);

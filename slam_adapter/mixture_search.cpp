@@ -32,12 +32,18 @@ CodingFigures figures_of(const EncodedTile& t) {
           out * t.rms_backward_m * t.rms_backward_m};
 }
 
+/// What the density of a tile is worth, for all its points [bits].
+double density_bits(const EncodedTile& t, double rms_m) {
+  const auto points = double(t.input_points);
+  return points * worth_of_density(8 * double(t.bytes.size()) / points, t.errors.density_error, rms_m);
+}
+
 /// What a mixture lost and takes, with what density is worth.
-CodingFigures sum_of(std::span<const TileTry> tiles) {
+CodingFigures sum_of(std::span<const TileTry> tiles, double rms_m) {
   CodingFigures sum;
   for (const TileTry& t : tiles) {
     const CodingFigures f = figures_of(t.coded);
-    sum.bits += f.bits + double(t.coded.input_points) * worth_of_density(t.coded.errors.density_error);
+    sum.bits += f.bits + density_bits(t.coded, rms_m);
     sum.forward += f.forward;
     sum.backward += f.backward;
   }
@@ -51,7 +57,7 @@ double balance_of(std::span<const TileTry> tiles) {
     in += double(t.coded.input_points);
     out += double(t.coded.points);
   }
-  const CodingFigures sum = sum_of(tiles);
+  const CodingFigures sum = sum_of(tiles, 0);
   return sum.forward > 0 && sum.backward > 0 ? std::sqrt(sum.forward / in / (sum.backward / out)) : 1;
 }
 
@@ -70,7 +76,7 @@ Status MixtureSearch::try_all(std::span<const std::size_t> tiles, const TileSett
     const EncodedTile& t = tries[i]->coded;
     CodingFigures figures = figures_of(t);
     sizes_[tiles[i]].push_back(figures);
-    figures.bits += double(t.input_points) * worth_of_density(t.errors.density_error);
+    figures.bits += density_bits(t, rms_m_);
     figures_[tiles[i]].push_back(figures);
     tried_[tiles[i]].push_back(std::move(*tries[i]));
   }
@@ -213,8 +219,8 @@ Result<std::optional<std::vector<TileTry>>> MixtureSearch::run(TileSettings surf
   return settled;
 }
 
-double cost_of(std::span<const TileTry> tiles) {
-  return sum_of(tiles).bits;
+double cost_of(std::span<const TileTry> tiles, double rms_m) {
+  return sum_of(tiles, rms_m).bits;
 }
 
 Result<std::optional<std::vector<TileTry>>> search_mixture(std::size_t tiles, double rms_m,
@@ -229,7 +235,7 @@ Result<std::optional<std::vector<TileTry>>> search_mixture(std::size_t tiles, do
   double& weight = other.trade.forward_weight;
   weight = std::min(balance < 1 ? weight * kOtherWeight : weight / kOtherWeight, 1.0);
   MAPCODEC_ASSIGN(auto second, MixtureSearch(tiles, rms_m, code, most_rms_m).run(other, with_points));
-  if (second && cost_of(*second) < cost_of(*best)) return second;
+  if (second && cost_of(*second, rms_m) < cost_of(*best, rms_m)) return second;
   return best;
 }
 

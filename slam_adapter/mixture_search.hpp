@@ -65,7 +65,7 @@ class MixtureSearch {
                                                                          bool with_points,
                                                                          double most_rms_m = INFINITY);
 
-/// What a mixture takes [bits], with what its density is worth.
-[[nodiscard]] double cost_of(std::span<const TileTry> tiles);
+/// What a mixture takes [bits], with what its density is worth where that rms is allowed.
+[[nodiscard]] double cost_of(std::span<const TileTry> tiles, double rms_m);
 
 }  // namespace mapcodec

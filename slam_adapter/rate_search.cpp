@@ -172,7 +172,7 @@ Result<std::optional<std::vector<TileTry>>> RateSearch::for_each_tile(CodingPlan
   // The search of surfaces alone goes by other steps and weights, and may find a little more.
   if (settled && with_points && surfaces.effort != Effort::fast) {
     MAPCODEC_ASSIGN(auto alone, search_mixture(tiles, rms_m, code, surfaces, false));
-    if (alone && cost_of(*alone) < cost_of(*settled)) return alone;
+    if (alone && cost_of(*alone, rms_m) < cost_of(*settled, rms_m)) return alone;
   }
   return settled;
 }

@@ -25,11 +25,12 @@ constexpr double kClearlyBetter = 0.995;  // of the best score before
 // setting moves by one.
 constexpr double kPriceSpread = 0.15, kWeightSpread = 0.15, kStepSpread = 0.02;
 
-double score_of(const CodedSum& sum) {
-  return sum.geometry_bits_per_point() + worth_of_density(sum.errors().density_error);
-}
-
 }  // namespace
+
+double WholeSearch::score_of(const CodedSum& sum) const {
+  const double bits = sum.geometry_bits_per_point();
+  return bits + worth_of_density(bits, sum.errors().density_error, rms_m_);
+}
 
 Result<WholeSearch::Kept> WholeSearch::code(const CodingPlan& plan) const {
   MapSchema with_step = schema_;

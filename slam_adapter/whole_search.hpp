@@ -38,6 +38,7 @@ class WholeSearch {
   [[nodiscard]] bool surfaces_alone() const { return surfaces_alone_; }
 
  private:
+  [[nodiscard]] double score_of(const CodedSum& sum) const;
   [[nodiscard]] Result<Kept> code(const CodingPlan& plan) const;
   void look_at(Kept&& tried);
   [[nodiscard]] Status try_plan(const CodingPlan& plan);

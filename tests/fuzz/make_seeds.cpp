@@ -10,6 +10,7 @@
 #include <string>
 
 #include "mapcodec/attribute/channel_encoder.hpp"
+#include "mapcodec/attribute/coarse_color.hpp"
 #include "mapcodec/codec/lossless_encoder.hpp"
 #include "mapcodec/codec/occupancy_encoder.hpp"
 #include "mapcodec/codec/points_encoder.hpp"
@@ -113,11 +114,17 @@ void surface_seeds(SeedFolder& folder) {
   }
 }
 
-/// Byte 0: scalar type, colour, components; byte 1: number of points (channel_fuzz.cpp).
-void channel_seed(SeedFolder& folder, std::uint8_t choice, ChannelSchema schema) {
-  constexpr std::size_t kCount = 200;
+constexpr std::size_t kCount = 200;
+
+std::vector<VoxelCoord> channel_voxels() {
   std::vector<VoxelCoord> voxels;
   for (std::uint64_t i = 0; i < kCount; ++i) voxels.push_back(morton_decode(i * i / 2 * 5));
+  return voxels;
+}
+
+/// Byte 0: scalar type, colour, components; byte 1: number of points (channel_fuzz.cpp).
+void channel_seed(SeedFolder& folder, std::uint8_t choice, ChannelSchema schema) {
+  const std::vector<VoxelCoord> voxels = channel_voxels();
   Channel values{schema.info, Bytes(kCount * schema.info.stride())};
   for (std::size_t i = 0; i < values.data.size(); ++i) values.data[i] = std::uint8_t(i % 4 == 3 ? 64 : i / 5);
   const auto encoded = encode_channel(schema, values, voxels, Effort::standard);
@@ -127,7 +134,24 @@ void channel_seed(SeedFolder& folder, std::uint8_t choice, ChannelSchema schema)
   folder.write("channel", seed);
 }
 
+/// Colours as surfaces have them.
+void coarse_color_seed(SeedFolder& folder, std::uint32_t step) {
+  const std::vector<VoxelCoord> voxels = channel_voxels();
+  ColorAims aims;
+  for (std::size_t i = 0; i < kCount; ++i) {
+    const auto level = static_cast<float>(i % 7 == 3 ? 200 : i);
+    aims.rgb.push_back({level, 100, level / 2});
+    aims.weights.push_back(1);
+  }
+  CoarseColorEncoder encoder(voxels, {"rgb", ScalarType::u8, 3}, ColorScale::eight);
+  const CoarseColors encoded = encoder.encode(aims, step, 1, CoarseColorEncoder::kUsualTrust);
+  Bytes seed{30, std::uint8_t(kCount)};
+  seed.insert(seed.end(), encoded.bytes.begin(), encoded.bytes.end());
+  folder.write("channel", seed);
+}
+
 void channel_seeds(SeedFolder& folder) {
+  for (const std::uint32_t step : {40u, 400u}) coarse_color_seed(folder, step);
   for (const auto kept : {ChannelKept::exact, ChannelKept::bounded}) {
     const double bound = kept == ChannelKept::bounded ? 5 : 0;
     channel_seed(folder, 30, {{"rgb", ScalarType::u8, 3}, kept, bound, {}});
