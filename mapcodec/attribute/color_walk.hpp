@@ -315,7 +315,9 @@ class ColorWalk {
     for (std::size_t c = 0; c < 3; ++c) {
       predicted[c] =
           divide_by_weight(groups_.predicted[b][c], w) - divide_by_weight(groups_.predicted[a][c], v);
-      if (settings_.coarse) predicted[c] = (predicted[c] * settings_.trust) >> 4;
+      if (settings_.coarse) {
+        predicted[c] = std::clamp((predicted[c] * settings_.trust) >> 4, -kMostDifference, kMostDifference);
+      }
       if constexpr (Policy::kKnows) {
         wanted[c] = divide_by_weight(groups_.truth[b][c], w) - divide_by_weight(groups_.truth[a][c], v) -
                     predicted[c];

@@ -458,7 +458,7 @@ class CoarseColors(Colors):
         self.contrast = [max((abs(s.mean[c] - cell.mean[c]) for s in sides), default=0) for c in range(3)]
 
     def believe(self, difference):
-        return difference * self.trust >> 4
+        return clamp(difference * self.trust >> 4, -(1 << 24), 1 << 24)
 
     def predict(self, cell, octant, across, places):
         near = [({a: self.side(octant, a)}, 1 << a, 2, 4) for a in range(3)]

@@ -189,7 +189,7 @@ int run(Arguments& a) {
     return kDone;
   }
   print_info(*map);
-  fmt::print("{:<12} {:.2f} s, {:.2f} M points/s on {} threads, peak memory {}\n", "time", report->seconds,
+  fmt::print("{:<12} {:.2f} s, {:.3g} M points/s on {} threads, peak memory {}\n", "time", report->seconds,
              double(report->points) / report->seconds / 1e6, report->threads,
              human_bytes(peak_memory_bytes()));
   return kDone;
