@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <gtest/gtest.h>
 
+#include "slam_adapter/coding_plan.hpp"
 #include "slam_adapter/surface_trades.hpp"
 
 namespace mapcodec {
@@ -82,6 +83,20 @@ TEST(SurfaceTrades, AChosenTradeStays) {
 TEST(SurfaceTrades, AnErrorEndsTheSearch) {
   const auto failing = [](CodingPlan&) -> Result<Tried> { return make_error(ErrorCode::kCancelled, "stop"); };
   EXPECT_EQ(find_trade(surfaces(), 1, failing).error().code, ErrorCode::kCancelled);
+}
+
+TEST(WorthOfDensity, CountsBeyondWhatTheRmsBringsAnyway) {
+  EXPECT_EQ(worth_of_density(3, 0.09, 0.005), 0);
+  EXPECT_GT(worth_of_density(3, 0.2, 0.005), 0);
+  EXPECT_GT(worth_of_density(3, 0.2, 0.005), worth_of_density(3, 0.15, 0.005));
+  // Points that lie 10 cm off are in other voxels of 10 cm.
+  EXPECT_EQ(worth_of_density(3, 0.8, 0.1), 0);
+}
+
+TEST(WorthOfDensity, IsAShareOfSmallCodings) {
+  EXPECT_NEAR(worth_of_density(0.02, 0.2, 0.005) / worth_of_density(0.01, 0.2, 0.005), 2, 1e-9);
+  EXPECT_LT(worth_of_density(0.02, 0.2, 0.005), 0.02);
+  EXPECT_EQ(worth_of_density(3, 0.2, 0.005), worth_of_density(6, 0.2, 0.005));
 }
 
 }  // namespace
