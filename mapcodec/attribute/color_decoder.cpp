@@ -92,7 +92,8 @@ Result<Channel> decode_color(ByteSpan bytes, const ChannelInfo& info, std::span<
   ByteReader in(bytes);
   MAPCODEC_ASSIGN(const Head head, read_head(in, info));
   // Keys, cells and means by the point, then the levels.
-  const std::uint64_t node_bytes = sizeof(ColorNode) + (head.settings.coarse ? sizeof(EdgeNodes) : 0);
+  const std::uint64_t node_bytes =
+      sizeof(ColorNode) + sizeof(FaceNodes) + (head.settings.coarse ? sizeof(EdgeNodes) : 0);
   const std::uint64_t needed =
       128 * std::uint64_t{voxels.size()} + node_bytes * ColorTree::count_nodes(voxels);
   if (voxels.size() > limits.max_points || needed > limits.max_bytes) {

@@ -40,6 +40,50 @@ std::uint32_t child_of(const ColorLevel& level, std::uint32_t node, std::uint32_
   return n.child + kOctantRank[n.mask][octant] - 1;
 }
 
+/// Calls f(node, octant, child) for all children of a level's nodes, in the order of the level below.
+template <class F>
+void for_each_child(const ColorLevel& level, F&& f) {
+  for (std::uint32_t n = 0; n < level.size(); ++n) {
+    std::uint32_t child = level.nodes[n].child;
+    for (std::uint32_t octant = 0; octant < 8; ++octant) {
+      if (((level.nodes[n].mask >> octant) & 1) != 0) f(n, octant, child++);
+    }
+  }
+}
+
+void link_faces(ColorLevel& level, const ColorLevel& parent) {
+  level.faces.resize(level.size());
+  for_each_child(parent, [&](std::uint32_t p, std::uint32_t octant, std::uint32_t child) {
+    FaceNodes& faces = level.faces[child];
+    for (std::uint32_t axis = 0; axis < 3; ++axis) {
+      const std::uint32_t high = (octant >> axis) & 1, mirrored = octant ^ (1u << axis);
+      faces[2 * axis + (high ^ 1)] = child_of(parent, p, mirrored);
+      faces[2 * axis + high] = child_of(parent, parent.faces[p][2 * axis + high], mirrored);
+    }
+  });
+}
+
+void link_edges(ColorLevel& level, const ColorLevel& parent) {
+  level.edges.resize(level.size());
+  for_each_child(parent, [&](std::uint32_t p, std::uint32_t octant, std::uint32_t child) {
+    EdgeNodes& edges = level.edges[child];
+    const FaceNodes& faces = parent.faces[p];
+    for (std::uint32_t pair = 0; pair < 3; ++pair) {
+      const auto [u, v] = kEdgeAxes[pair];
+      const std::uint32_t high_u = (octant >> u) & 1, high_v = (octant >> v) & 1;
+      for (std::uint32_t side = 0; side < 4; ++side) {
+        const std::uint32_t side_u = side & 1, side_v = side >> 1;
+        // The parent that the neighbour is in: beyond an edge, a face or none of this one.
+        const std::uint32_t cell = side_u == high_u && side_v == high_v ? parent.edges[p][4 * pair + side]
+                                   : side_u == high_u                   ? faces[2 * u + side_u]
+                                   : side_v == high_v                   ? faces[2 * v + side_v]
+                                                                        : p;
+        edges[4 * pair + side] = child_of(parent, cell, octant ^ (1u << u) ^ (1u << v));
+      }
+    }
+  });
+}
+
 }  // namespace
 
 std::uint64_t ColorTree::count_nodes(std::span<const VoxelCoord> voxels) {
@@ -53,13 +97,15 @@ std::uint64_t ColorTree::count_nodes(std::span<const VoxelCoord> voxels) {
 ColorTree::ColorTree(std::span<const VoxelCoord> voxels, bool edges)
     : points_(static_cast<std::uint32_t>(voxels.size())) {
   build_levels(voxels);
-  levels_.front().nodes.front().faces.fill(kNoNode);
-  // Finest cells are not split any more: nobody asks what is around them.
-  for (std::size_t l = 1; l + 1 < levels_.size(); ++l) link_faces(levels_[l], levels_[l - 1]);
-  if (!edges) return;
-  levels_.front().edges.resize(1);
-  levels_.front().edges.front().fill(kNoNode);
-  for (std::size_t l = 1; l + 1 < levels_.size(); ++l) link_edges(levels_[l], levels_[l - 1]);
+  ColorLevel& root = levels_.front();
+  root.faces.resize(1);
+  root.faces.front().fill(kNoNode);
+  if (edges) root.edges.resize(1);
+  if (edges) root.edges.front().fill(kNoNode);
+  for (std::size_t l = 1; l + 1 < levels_.size(); ++l) {
+    link_faces(levels_[l], levels_[l - 1]);
+    if (edges) link_edges(levels_[l], levels_[l - 1]);
+  }
 }
 
 void ColorTree::build_levels(std::span<const VoxelCoord> voxels) {
@@ -75,9 +121,9 @@ void ColorTree::build_levels(std::span<const VoxelCoord> voxels) {
     const std::uint64_t cell = keys[i] >> shift;
     if (!cells.empty() && cells.back() == cell) continue;
     cells.push_back(cell);
-    level.nodes.push_back({i, 0, 0, {}});
+    level.nodes.push_back({i, 0, 0});
   }
-  level.nodes.push_back({points_, 0, 0, {}});
+  level.nodes.push_back({points_, 0, 0});
   levels_.push_back(std::move(level));
   while (cells.size() > 1) {
     const ColorLevel& below = levels_.back();
@@ -88,57 +134,15 @@ void ColorTree::build_levels(std::span<const VoxelCoord> voxels) {
       const auto octant = static_cast<std::uint32_t>(cells[c] & 7);
       if (parents == 0 || cells[parents - 1] != cell) {
         cells[parents++] = cell;
-        above.nodes.push_back({below.nodes[c].begin, static_cast<std::uint32_t>(c), 0, {}});
+        above.nodes.push_back({below.nodes[c].begin, static_cast<std::uint32_t>(c), 0});
       }
       above.nodes.back().mask |= static_cast<std::uint8_t>(1u << octant);
     }
-    above.nodes.push_back({points_, static_cast<std::uint32_t>(cells.size()), 0, {}});
+    above.nodes.push_back({points_, static_cast<std::uint32_t>(cells.size()), 0});
     cells.resize(parents);
     levels_.push_back(std::move(above));
   }
   std::reverse(levels_.begin(), levels_.end());
-}
-
-void ColorTree::link_faces(ColorLevel& level, const ColorLevel& parent) {
-  for (std::uint32_t p = 0; p < parent.size(); ++p) {
-    const ColorNode& n = parent.nodes[p];
-    std::uint32_t at = n.child;
-    for (std::uint32_t octant = 0; octant < 8; ++octant) {
-      if (((n.mask >> octant) & 1) == 0) continue;
-      ColorNode& node = level.nodes[at++];
-      for (std::uint32_t axis = 0; axis < 3; ++axis) {
-        const std::uint32_t high = (octant >> axis) & 1, mirrored = octant ^ (1u << axis);
-        const std::uint32_t outer = n.faces[2 * axis + high];
-        node.faces[2 * axis + (high ^ 1)] = child_of(parent, p, mirrored);
-        node.faces[2 * axis + high] = child_of(parent, outer, mirrored);
-      }
-    }
-  }
-}
-
-void ColorTree::link_edges(ColorLevel& level, const ColorLevel& parent) {
-  level.edges.resize(level.size());
-  for (std::uint32_t p = 0; p < parent.size(); ++p) {
-    const ColorNode& n = parent.nodes[p];
-    std::uint32_t at = n.child;
-    for (std::uint32_t octant = 0; octant < 8; ++octant) {
-      if (((n.mask >> octant) & 1) == 0) continue;
-      EdgeNodes& edges = level.edges[at++];
-      for (std::uint32_t pair = 0; pair < 3; ++pair) {
-        const auto [u, v] = kEdgeAxes[pair];
-        const std::uint32_t high_u = (octant >> u) & 1, high_v = (octant >> v) & 1;
-        for (std::uint32_t side = 0; side < 4; ++side) {
-          const std::uint32_t side_u = side & 1, side_v = side >> 1;
-          // The parent that the neighbour is in: beyond an edge, a face or none of this one.
-          const std::uint32_t cell = side_u == high_u && side_v == high_v ? parent.edges[p][4 * pair + side]
-                                     : side_u == high_u                   ? n.faces[2 * u + side_u]
-                                     : side_v == high_v                   ? n.faces[2 * v + side_v]
-                                                                          : p;
-          edges[4 * pair + side] = child_of(parent, cell, octant ^ (1u << u) ^ (1u << v));
-        }
-      }
-    }
-  }
 }
 
 }  // namespace mapcodec

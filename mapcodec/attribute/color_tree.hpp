@@ -16,12 +16,12 @@ inline constexpr std::uint32_t kNoNode = ~std::uint32_t{0};
 /// A cell: points [begin, the next node's begin).
 struct ColorNode {
   std::uint32_t begin = 0;
-  std::uint32_t child = 0;               ///< index of its first child in the level below
-  std::uint8_t mask = 0;                 ///< octants that hold points
-  std::array<std::uint32_t, 6> faces{};  ///< nodes of this level across -x, +x, -y, +y, -z, +z, or kNoNode;
-                                         ///< not of the finest level
+  std::uint32_t child = 0;  ///< index of its first child in the level below
+  std::uint8_t mask = 0;    ///< octants that hold points
 };
 
+/// Nodes of the same level across a cell's faces -x, +x, -y, +y, -z, +z, or kNoNode.
+using FaceNodes = std::array<std::uint32_t, 6>;
 /// Nodes across a cell's edges, or kNoNode: four for each pair of axes (x y, x z, y z), low low, high low,
 /// low high, high high.
 using EdgeNodes = std::array<std::uint32_t, 12>;
@@ -32,7 +32,9 @@ inline constexpr std::array<std::array<std::uint32_t, 2>, 3> kEdgeAxes{{{0, 1}, 
 /// something.
 struct ColorLevel {
   std::vector<ColorNode> nodes;
-  std::vector<EdgeNodes> edges;  ///< by the node; none in the finest level, or if the tree is without
+  // By the node. Finest cells are not split any more: nobody asks what is around them, and both are empty.
+  std::vector<FaceNodes> faces;
+  std::vector<EdgeNodes> edges;  ///< only if the tree has them
   [[nodiscard]] std::size_t size() const { return nodes.size() - 1; }
   [[nodiscard]] std::uint32_t weight(std::size_t n) const { return nodes[n + 1].begin - nodes[n].begin; }
 };
@@ -52,8 +54,6 @@ class ColorTree {
 
  private:
   void build_levels(std::span<const VoxelCoord> voxels);
-  static void link_faces(ColorLevel& level, const ColorLevel& parent);
-  static void link_edges(ColorLevel& level, const ColorLevel& parent);
 
   std::uint32_t points_;
   std::vector<ColorLevel> levels_;

@@ -210,12 +210,12 @@ class ColorWalk {
   /// there if it is decoded already, else the whole cell.
   [[nodiscard]] ColorPoint predict(const ColorLevel& level, std::uint32_t n, std::uint32_t octant) const {
     if (settings_.coarse) return predict_coarse(level, n, octant);
-    const ColorNode& node = level.nodes[n];
+    const FaceNodes& faces = level.faces[n];
     std::int64_t weight = kOwnWeight;
     ColorPoint sum{};
     for (std::size_t c = 0; c < 3; ++c) sum[c] = means_[n][c] * kOwnWeight;
     for (std::uint32_t axis = 0; axis < 3; ++axis) {
-      const std::uint32_t face = node.faces[2 * axis + ((octant >> axis) & 1)];
+      const std::uint32_t face = faces[2 * axis + ((octant >> axis) & 1)];
       if (face == kNoNode) continue;
       const ColorNode& other = level.nodes[face];
       const std::uint32_t mirrored = octant ^ (1u << axis);
@@ -249,10 +249,9 @@ class ColorWalk {
       for (std::size_t c = 0; c < 3; ++c) sum[c] += w * doubted(value[c] - own[c], c);
       weight += w;
     };
-    const ColorNode& node = level.nodes[n];
+    const FaceNodes& faces = level.faces[n];
     for (std::uint32_t axis = 0; axis < 3; ++axis) {
-      add(node.faces[2 * axis + ((octant >> axis) & 1)], octant ^ (1u << axis), kFaceWeight,
-          kTouchingFaceWeight);
+      add(faces[2 * axis + ((octant >> axis) & 1)], octant ^ (1u << axis), kFaceWeight, kTouchingFaceWeight);
     }
     for (std::uint32_t pair = 0; pair < 3; ++pair) {
       const auto [u, v] = kEdgeAxes[pair];
@@ -270,10 +269,10 @@ class ColorWalk {
   }
 
   void set_context(const ColorLevel& level, std::uint32_t n) {
-    const ColorNode& node = level.nodes[n];
+    const FaceNodes& faces = level.faces[n];
     std::uint32_t around = n > 0 ? node_activity_[n - 1] : 0;
     for (std::size_t f = 0; f < 6; f += 2) {
-      if (node.faces[f] != kNoNode) around += node_activity_[node.faces[f]];
+      if (faces[f] != kNoNode) around += node_activity_[faces[f]];
     }
     context_.around = std::min<std::uint32_t>(static_cast<std::uint32_t>(std::bit_width(around)), 5);
     context_.above =
@@ -288,7 +287,7 @@ class ColorWalk {
       (e < n ? diagonal : ahead) += e < n ? node_activity_[e] : activity_[e];
     }
     contrast_ = {};
-    for (const std::uint32_t f : level.nodes[n].faces) {
+    for (const std::uint32_t f : level.faces[n]) {
       if (f == kNoNode) continue;
       if (f > n) ahead += 2 * std::uint32_t{activity_[f]};
       for (std::size_t c = 0; c < 3; ++c)

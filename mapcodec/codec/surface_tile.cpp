@@ -170,7 +170,7 @@ TileMemo::~TileMemo() = default;
 std::uint64_t TileMemo::bytes_for(std::uint64_t points) {
   constexpr std::uint64_t kPositions =
       sizeof(Vec3) + sizeof(surface::SubUnits) + 2 * (4 + sizeof(double)) + 12;
-  constexpr std::uint64_t kColor = 200;  // a SurfaceColorEncoder of few voxels, about
+  constexpr std::uint64_t kColor = 250;  // a SurfaceColorEncoder of few voxels, about
   return points * (kPositions + kColor);
 }
 
