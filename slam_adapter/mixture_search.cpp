@@ -38,27 +38,17 @@ double density_bits(const EncodedTile& t, double rms_m) {
   return points * worth_of_density(8 * double(t.bytes.size()) / points, t.errors.density_error, rms_m);
 }
 
-/// What a mixture lost and takes, with what density is worth.
-CodingFigures sum_of(std::span<const TileTry> tiles, double rms_m) {
-  CodingFigures sum;
-  for (const TileTry& t : tiles) {
-    const CodingFigures f = figures_of(t.coded);
-    sum.bits += f.bits + density_bits(t.coded, rms_m);
-    sum.forward += f.forward;
-    sum.backward += f.backward;
-  }
-  return sum;
-}
-
 /// Forward RMS over backward RMS.
 double balance_of(std::span<const TileTry> tiles) {
-  double in = 0, out = 0;
+  double in = 0, out = 0, forward = 0, backward = 0;
   for (const TileTry& t : tiles) {
+    const CodingFigures f = figures_of(t.coded);
     in += double(t.coded.input_points);
     out += double(t.coded.points);
+    forward += f.forward;
+    backward += f.backward;
   }
-  const CodingFigures sum = sum_of(tiles, 0);
-  return sum.forward > 0 && sum.backward > 0 ? std::sqrt(sum.forward / in / (sum.backward / out)) : 1;
+  return forward > 0 && backward > 0 ? std::sqrt(forward / in / (backward / out)) : 1;
 }
 
 /// The next step, at which not quite the same is seen again.
@@ -220,7 +210,9 @@ Result<std::optional<std::vector<TileTry>>> MixtureSearch::run(TileSettings surf
 }
 
 double cost_of(std::span<const TileTry> tiles, double rms_m) {
-  return sum_of(tiles, rms_m).bits;
+  double bits = 0;
+  for (const TileTry& t : tiles) bits += figures_of(t.coded).bits + density_bits(t.coded, rms_m);
+  return bits;
 }
 
 Result<std::optional<std::vector<TileTry>>> search_mixture(std::size_t tiles, double rms_m,
