@@ -18,7 +18,7 @@ constexpr int kTriesForNear = 3;
 constexpr double kColorAim = 0.993, kNearColor = 0.985, kFirstSlope = 25, kLeastSlope = 0.1,
                  kMostSlope = 4000;
 // How the error grows with the slope, and how far one guess may go.
-constexpr double kColorExponent = 0.22, kColorLeap = 2;
+constexpr double kColorExponent = 0.22, kColorLeap = 2, kColorFallBack = 0.7;
 // What nobody asked for shall not come nearer than this to the least error that positions allow.
 constexpr double kAboveLeast = 1.2;
 constexpr int kColorTries = 4;
@@ -120,8 +120,10 @@ PlanAdjuster::ColorState PlanAdjuster::adjust_map_color(double asked_bound) {
   if (error <= bound && (error >= kNearColor * bound || color_slope_ >= most || color_tries_ >= kColorTries))
     return ColorState::met;
   if (!color_secant_) color_secant_.emplace(kColorAim * bound, kColorExponent, kColorLeap);
-  color_slope_ = std::clamp(color_secant_->next(color_slope_, error), least, most);
-  if (error > bound && color_tries_ > kColorTries) color_slope_ = least;
+  // After many tries ever more is given, until the bound is kept.
+  const double next = error > bound && color_tries_ > kColorTries ? kColorFallBack * color_slope_
+                                                                  : color_secant_->next(color_slope_, error);
+  color_slope_ = std::clamp(next, least, most);
   return ColorState::missed;
 }
 

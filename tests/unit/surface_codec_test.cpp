@@ -228,6 +228,7 @@ TEST(SurfaceTile, ColorMeetsItsBound) {
     const auto e = encode_tile(cloud, schema, tile);
     ASSERT_TRUE(e.ok());
     EXPECT_LE(e->errors.color_error, bound);
+    EXPECT_GE(e->errors.color_error, 0.95 * bound);
     EXPECT_LT(static_cast<double>(e->bytes.size()), last);
     last = static_cast<double>(e->bytes.size());
   }
