@@ -16,7 +16,8 @@ struct ColorModels {
 };
 
 /// Contexts of coarse settings. Symbols are few: each bit is a mixture, so that what a context has not seen
-/// yet another one knows.
+/// yet another one knows. Slot: 4 * component + non-zero components before it (1: L, 2: M); length: bits of
+/// |q| - 1 known so far.
 struct CoarseColorModels {
   template <std::size_t kInputs>
   using Mixer = LogisticMixerOf<kInputs, 15>;
